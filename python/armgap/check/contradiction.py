@@ -54,9 +54,9 @@ _MOST_SUSPECTS = 3
 # A reading of the input is right if its prediction error is below this part of the prediction error with the log as it stands. Unmodelled effects
 # seldom change the RMS of wrong readings by less than a factor of two.
 BETTER = 0.7
-# Least fall of the logarithms of that ratio and of the equation error together with a right reading of the input. Of 161 right readings on 14 cases,
-# where an arm may have what the log as it stands asks for, the least say 1.3 (beside a drive that saturates), 1.9 and 2.1; wrong readings of pieces
-# of two runs of a real arm say 0.73 and 0.86.
+# Least decrease, with a right reading of the input, of the logarithms of prediction error and equation error together. Of 161 right readings on 14
+# cases, where an arm may have the parameters that the log as it stands suggests, the least are 1.3 (beside a drive that saturates), 1.9 and 2.1;
+# wrong readings of pieces of two runs of a real arm reach 0.73 and 0.86.
 _SAYS = 1.0
 # Largest ratio of a reading's prediction error to that of the log as it stands, where the log as it stands needs parameters outside the
 # bounds, and for a factor on all torques that the arm file's parameters may be off by instead.

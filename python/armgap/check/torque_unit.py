@@ -152,7 +152,7 @@ class _Reading:
 
 
 def _read(base: EquationError, logs: Sequence[Log], arm: Arm) -> _Reading:
-    """Return the factors of the torques, with limits of drives and elastic torques tried where factors alone leave much.
+    """Return the factors of the torques, with limits of drives and elastic torques tried where factors alone leave much torque unexplained.
 
     A column in another unit may stand before a drive that is limited, or on a joint with a spring or a stop: such a joint's factor is
     identifiable only behind the limit, or beside the elastic torque.

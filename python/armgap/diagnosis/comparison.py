@@ -63,7 +63,7 @@ class CauseChange:
     why : str
         Reason of the status in words.
     joints, row : tuple of int, optional
-        Two joints and the factors of their motion, of a term on a row over them.
+        Two joints, and the factors of their positions in the sum or difference that the cause acts on.
     """
 
     effect: str

@@ -239,7 +239,7 @@ def _ambiguous_delay(data: dict[str, Any], training: list[Log], arm: Arm) -> lis
 
 
 def _hidden_delay(data: dict[str, Any], given: PreparedInput) -> list[Check]:
-    """Return a warning of a time shift of the file that predictions support beside an unnamed gap, or beside equal delays or lags of all joints."""
+    """Return a warning that torques come late or early in the file, as predictions say where a gap is unexplained or all joints have equal delays."""
     late = {c["joint"] for c in data["causes"] if c["effect"] in ("actuator_delay", "actuator_lag")}
     asked = data["verdict"] == "unexplained" or len(late) == given.arm.n_joints > 1
     if not asked or given.arm.chain is not None or any(check.check == "time_shift" for check in given.checks):

@@ -7,14 +7,13 @@ varies by more than chance: a common change of all robots on a day is no drift.
 changing mean Siegmund and Venkatraman 1995): for every onset the slope by weighted least squares, with an unknown level, over its standard
 deviation; the largest of all counts.
 
-**Scatter.** A visit's variance is that of its estimate plus a scatter from visit to visit, which is the fleet's: chosen so that the squared
-differences between neighbouring visits, which a ramp hardly changes, are what they have to be on the median robot (Paule and Mandel 1982; von Neumann
-et al. 1941). A robot's own dispersion about it is drawn towards the fleet's by as much as the robots agree (Smyth 2004), and the less, the less
-likely so large a dispersion is under that agreement (Phipson et al. 2016), so that a robot that scatters more than the others is judged by
-its own scatter.
+**Scatter.** A visit's variance is that of its estimate plus a scatter from visit to visit. The fleet's scatter is chosen so that the squared
+differences between neighbouring visits, which a ramp hardly changes, have their expected size on the median robot (Paule and Mandel 1982; von Neumann
+et al. 1941). A robot's own scatter is shrunk towards the fleet's, by more the better the robots agree (Smyth 2004), and by less the less likely so
+large a scatter is under that agreement (Phipson et al. 2016), so that a robot that scatters more than the others is judged by its own scatter.
 
-**Autocorrelation.** What a visit scatters by may last until the next: a first-order autocorrelation common to the fleet, from differences between
-neighbours and between visits two apart, as far as it is more than chance. Equations are whitened by it (Prais and Winsten 1954).
+**Autocorrelation.** A deviation at one visit may last until the next: a first-order autocorrelation common to the fleet is estimated from differences
+between neighbours and between visits two apart, as far as it is more than chance. Equations are whitened by it (Prais and Winsten 1954).
 
 **Threshold.** With normal errors and a variance of ``nu`` degrees of freedom, the largest statistic of a family of ramps that is a curve of length
 ``kappa`` on the sphere exceeds ``b`` with a probability of at most ``(1 + kappa/pi) (1 + b^2/nu)^(-nu/2)`` (Knowles and Siegmund 1989, with
@@ -42,9 +41,9 @@ __all__ = [
 
 Array = NDArray[np.float64]
 FALSE_ALARMS = 2e-3
-"""Allowed false alarms of drift per visit of all robots of a fleet, over all parameters: at most one in 500 visits. The bound is wide, and a visit
-shares its evidence with those before: with normal scatter it is one in about 1500. Twice as many find a drift of 3 % per visit in a scatter of 10 %
-a fifth of a visit sooner.
+"""Allowed false alarms of drift per visit of all robots of a fleet, over all parameters: at most one in 500 visits. With normal scatter there is one
+in about 1500, as the bound is conservative and a visit shares its evidence with those before. With twice the value a drift of 3 % per visit in a
+scatter of 10 % is found only a fifth of a visit sooner.
 """
 # Visits before a ramp that determine its initial level, and fewest visits on the ramp.
 _FEWEST_BEFORE, _FEWEST_ON = 3, 3

@@ -148,7 +148,7 @@ class PredictedMotion:
         self._stride = 1 if most is None else -(-every // most)
         self._windows = np.arange(0, every, self._stride)
         self._count = len(self._windows)
-        #: Windows that each one looked at stands for.
+        #: Number of windows that each predicted window stands for.
         self._share = every / self._count
         self._every = every
         length = every * self._samples + 1

@@ -227,9 +227,9 @@ def plan(
 ) -> Plan:
     """Plan the motion that best settles the questions a diagnosis left open.
 
-    Of the motions tried, the one with the most expected evidence is taken: the log-likelihood ratio of the effect in question against its
-    rival, both with all values fitted to the planned motion (T-optimality, Atkinson and Fedorov 1975). It keeps to the arm file's limits, or to
-    what the diagnosed logs covered, and begins and ends at rest.
+    Of the motions tried, the one with the most expected evidence is taken: the log-likelihood ratio of the effect in question against its rival, both
+    with all values fitted to the planned motion (T-optimality, Atkinson and Fedorov 1975). The motion keeps to the arm file's limits, or to the range
+    of the diagnosed logs, and begins and ends at rest.
 
     Parameters
     ----------

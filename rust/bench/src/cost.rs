@@ -1,8 +1,8 @@
-//! Time per sample of online estimators as a controller meets it: of each single call, and how much of it the machine adds.
+//! Distribution of the time that an online estimator takes for one sample, call by call as in a controller, and the noise of the machine.
 //!
-//! Every call is timed on its own, less the time of reading the clock; the typical time comes from whole runs, in which the clock is
-//! read once. The noise is measured by fixed arithmetic: the time by which its slowest call exceeds its typical one is due to the machine
-//! (interrupts, other programs), and the slowest sample includes as much of it.
+//! Every call is timed on its own, less the time of reading the clock; the typical time comes from whole runs, in which the clock is read once. The
+//! noise is measured by fixed arithmetic: the time by which the slowest call of the arithmetic exceeds its typical call is due to the machine
+//! (interrupts, other programs), and the estimator's slowest sample includes as much of it.
 
 use crate::run::{PERIOD, arm, samples};
 use armgap_core::filter::Cutoff;

@@ -6,8 +6,10 @@ use nalgebra::{SMatrix, SVector};
 use std::hint::black_box;
 use std::time::Instant;
 
-/// Number of samples per run, and number of runs (`RUNS`) whose median time counts.
+/// Number of samples per run of recursive least squares.
 const SAMPLES: usize = 400;
+
+/// Number of runs whose median time counts.
 const RUNS: usize = 15;
 
 /// Median time of an update of recursive least squares with `R` parameters and `M` errors, ns.

@@ -441,8 +441,8 @@ size_t armgap_parameters(uint32_t arm);
 const char *armgap_message(int32_t status);
 
 /*
- Starts an estimator in the caller's memory; `size` is `sizeof(*estimator)`. `theta0` has `count` start values, SI, one per parameter, or is optional with
- `count` 0, which means zeros. Starting again is allowed at any time.
+ Starts an estimator in the caller's memory; `size` is `sizeof(*estimator)`. `theta0` has `count` start values, SI, one per parameter, or is
+ optional with `count` 0, which means zeros. Starting again is allowed at any time.
  */
 armgap_status armgap_start(armgap_estimator *estimator,
                            size_t size,
@@ -451,8 +451,8 @@ armgap_status armgap_start(armgap_estimator *estimator,
                            size_t count);
 
 /*
- Takes one sample at time `t` [s]: positions, optional velocities, and the torques that act until the next sample, SI, each of `joints` entries. Whether
- velocities are given is settled by the first sample.
+ Takes one sample at time `t` [s]: positions, optional velocities, and the torques that act until the next sample, SI, each of `joints` entries.
+ Whether velocities are given is settled by the first sample.
  */
 armgap_status armgap_update(armgap_estimator *estimator,
                             double t,
@@ -497,8 +497,8 @@ armgap_status armgap_errors(const armgap_estimator *estimator,
 armgap_status armgap_report_of(const armgap_estimator *estimator, armgap_report *report);
 
 /*
- Starts an estimator in the caller's memory; `size` is `sizeof(*estimator)`. `theta0` has `count` start values, SI, one per parameter, or is optional with
- `count` 0, which means zeros. Starting again is allowed at any time.
+ Starts an estimator in the caller's memory; `size` is `sizeof(*estimator)`. `theta0` has `count` start values, SI, one per parameter, or is
+ optional with `count` 0, which means zeros. Starting again is allowed at any time.
  */
 armgap_status armgap_start_f32(armgap_estimator_f32 *estimator,
                                size_t size,
@@ -507,8 +507,8 @@ armgap_status armgap_start_f32(armgap_estimator_f32 *estimator,
                                size_t count);
 
 /*
- Takes one sample at time `t` [s]: positions, optional velocities, and the torques that act until the next sample, SI, each of `joints` entries. Whether
- velocities are given is settled by the first sample.
+ Takes one sample at time `t` [s]: positions, optional velocities, and the torques that act until the next sample, SI, each of `joints` entries.
+ Whether velocities are given is settled by the first sample.
  */
 armgap_status armgap_update_f32(armgap_estimator_f32 *estimator,
                                 float t,
@@ -553,7 +553,8 @@ armgap_status armgap_errors_f32(const armgap_estimator_f32 *estimator,
 armgap_status armgap_report_of_f32(const armgap_estimator_f32 *estimator, armgap_report *report);
 
 /*
- Moves an `armgap_arm` with the parameters `theta` by `h` seconds under held torques `tau`, SI; positions `q` and velocities `dq` are read and written.
+ Moves an `armgap_arm` with the parameters `theta` by `h` seconds under held torques `tau`, SI; positions `q` and velocities `dq` are read and
+ written.
  */
 armgap_status armgap_advance(uint32_t arm,
                              const double *theta,
@@ -565,8 +566,8 @@ armgap_status armgap_advance(uint32_t arm,
                              size_t joints);
 
 /*
- Fills `settings` for an arm with this number of joints and estimated parameters on a level base: filtered power model, exact filters at 50 rad/s, no
- forgetting, gravity of 9.81 m/s^2 against z.
+ Fills `settings` for an arm with this number of joints and estimated parameters on a level base: filtered power model, exact filters at 50 rad/s,
+ no forgetting, gravity of 9.81 m/s^2 against z.
  */
 armgap_status armgap_chain_settings_default(armgap_chain_settings *settings,
                                             uint32_t joints,
@@ -579,11 +580,11 @@ size_t armgap_chain_size(uint32_t joints,
                          uint32_t parameters);
 
 /*
- Starts an estimator of a serial arm in `size` bytes of the caller's memory, at least `armgap_chain_size`. `joints` has one entry per joint, `columns` one
- per estimated parameter, strictly ascending: indices from 0 into ten numbers of each link (mass, first moments x, y, z, second moments xx, xy, yy, xz, yz,
- zz about the origin of the link's frame), then rotor inertias, viscous, Coulomb, and constant torques of all joints. `known` holds values of the first 13
- numbers per joint, SI, used for those that are not estimated; optional, zeros by default. `theta0` holds one start value per estimated parameter;
- optional, zeros by default. Starting again is allowed at any time.
+ Starts an estimator of a serial arm in `size` bytes of the caller's memory, at least `armgap_chain_size`. `joints` has one entry per joint,
+ `columns` one per estimated parameter, strictly ascending: indices from 0 into ten numbers of each link (mass, first moments x, y, z, second
+ moments xx, xy, yy, xz, yz, zz about the origin of the link's frame), then rotor inertias, viscous, Coulomb, and constant torques of all joints.
+ `known` holds values of the first 13 numbers per joint, SI, used for those that are not estimated; optional, zeros by default. `theta0` holds one
+ start value per estimated parameter; optional, zeros by default. Starting again is allowed at any time.
  */
 armgap_status armgap_chain_start(void *memory,
                                  size_t size,
@@ -594,8 +595,8 @@ armgap_status armgap_chain_start(void *memory,
                                  const double *theta0);
 
 /*
- Takes one sample of a serial arm at time `t` [s]: positions, optional velocities, and the torques that act until the next sample, SI, each of `joints`
- entries. Whether velocities are given is settled by the first sample.
+ Takes one sample of a serial arm at time `t` [s]: positions, optional velocities, and the torques that act until the next sample, SI, each of
+ `joints` entries. Whether velocities are given is settled by the first sample.
  */
 armgap_status armgap_chain_update(void *memory,
                                   double t,
@@ -652,11 +653,11 @@ size_t armgap_chain_size_f32(uint32_t joints,
                              uint32_t parameters);
 
 /*
- Starts an estimator of a serial arm in `size` bytes of the caller's memory, at least `armgap_chain_size_f32`. `joints` has one entry per joint, `columns`
- one per estimated parameter, strictly ascending: indices from 0 into ten numbers of each link (mass, first moments x, y, z, second moments xx, xy, yy, xz,
- yz, zz about the origin of the link's frame), then rotor inertias, viscous, Coulomb, and constant torques of all joints. `known` holds values of the first
- 13 numbers per joint, SI, used for those that are not estimated; optional, zeros by default. `theta0` holds one start value per estimated parameter;
- optional, zeros by default. Starting again is allowed at any time.
+ Starts an estimator of a serial arm in `size` bytes of the caller's memory, at least `armgap_chain_size_f32`. `joints` has one entry per joint,
+ `columns` one per estimated parameter, strictly ascending: indices from 0 into ten numbers of each link (mass, first moments x, y, z, second
+ moments xx, xy, yy, xz, yz, zz about the origin of the link's frame), then rotor inertias, viscous, Coulomb, and constant torques of all joints.
+ `known` holds values of the first 13 numbers per joint, SI, used for those that are not estimated; optional, zeros by default. `theta0` holds one
+ start value per estimated parameter; optional, zeros by default. Starting again is allowed at any time.
  */
 armgap_status armgap_chain_start_f32(void *memory,
                                      size_t size,
@@ -667,8 +668,8 @@ armgap_status armgap_chain_start_f32(void *memory,
                                      const float *theta0);
 
 /*
- Takes one sample of a serial arm at time `t` [s]: positions, optional velocities, and the torques that act until the next sample, SI, each of `joints`
- entries. Whether velocities are given is settled by the first sample.
+ Takes one sample of a serial arm at time `t` [s]: positions, optional velocities, and the torques that act until the next sample, SI, each of
+ `joints` entries. Whether velocities are given is settled by the first sample.
  */
 armgap_status armgap_chain_update_f32(void *memory,
                                       float t,

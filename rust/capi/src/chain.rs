@@ -95,8 +95,8 @@ impl armgap_chain_settings {
     }
 }
 
-/// Fills `settings` for an arm with this number of joints and estimated parameters on a level base: filtered power model, exact filters at 50 rad/s, no
-/// forgetting, gravity of 9.81 m/s^2 against z.
+/// Fills `settings` for an arm with this number of joints and estimated parameters on a level base: filtered power model, exact filters at 50 rad/s,
+/// no forgetting, gravity of 9.81 m/s^2 against z.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn armgap_chain_settings_default(
     settings: *mut armgap_chain_settings,
@@ -141,11 +141,11 @@ pub extern "C" fn armgap_chain_size(joints: u32, parameters: u32) -> usize {
     slot::size::<f64>(joints, parameters)
 }
 
-/// Starts an estimator of a serial arm in `size` bytes of the caller's memory, at least `armgap_chain_size`. `joints` has one entry per joint, `columns` one
-/// per estimated parameter, strictly ascending: indices from 0 into ten numbers of each link (mass, first moments x, y, z, second moments xx, xy, yy, xz, yz,
-/// zz about the origin of the link's frame), then rotor inertias, viscous, Coulomb, and constant torques of all joints. `known` holds values of the first 13
-/// numbers per joint, SI, used for those that are not estimated; optional, zeros by default. `theta0` holds one start value per estimated parameter;
-/// optional, zeros by default. Starting again is allowed at any time.
+/// Starts an estimator of a serial arm in `size` bytes of the caller's memory, at least `armgap_chain_size`. `joints` has one entry per joint,
+/// `columns` one per estimated parameter, strictly ascending: indices from 0 into ten numbers of each link (mass, first moments x, y, z, second
+/// moments xx, xy, yy, xz, yz, zz about the origin of the link's frame), then rotor inertias, viscous, Coulomb, and constant torques of all joints.
+/// `known` holds values of the first 13 numbers per joint, SI, used for those that are not estimated; optional, zeros by default. `theta0` holds one
+/// start value per estimated parameter; optional, zeros by default. Starting again is allowed at any time.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn armgap_chain_start(
     memory: *mut c_void,
@@ -159,8 +159,8 @@ pub unsafe extern "C" fn armgap_chain_start(
     unsafe { slot::start::<f64>(memory, size, settings, joints, columns, known, theta0) }
 }
 
-/// Takes one sample of a serial arm at time `t` [s]: positions, optional velocities, and the torques that act until the next sample, SI, each of `joints`
-/// entries. Whether velocities are given is settled by the first sample.
+/// Takes one sample of a serial arm at time `t` [s]: positions, optional velocities, and the torques that act until the next sample, SI, each of
+/// `joints` entries. Whether velocities are given is settled by the first sample.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn armgap_chain_update(
     memory: *mut c_void,

@@ -12,11 +12,11 @@ pub extern "C" fn armgap_chain_size_f32(joints: u32, parameters: u32) -> usize {
     slot::size::<f32>(joints, parameters)
 }
 
-/// Starts an estimator of a serial arm in `size` bytes of the caller's memory, at least `armgap_chain_size_f32`. `joints` has one entry per joint, `columns`
-/// one per estimated parameter, strictly ascending: indices from 0 into ten numbers of each link (mass, first moments x, y, z, second moments xx, xy, yy, xz,
-/// yz, zz about the origin of the link's frame), then rotor inertias, viscous, Coulomb, and constant torques of all joints. `known` holds values of the first
-/// 13 numbers per joint, SI, used for those that are not estimated; optional, zeros by default. `theta0` holds one start value per estimated parameter;
-/// optional, zeros by default. Starting again is allowed at any time.
+/// Starts an estimator of a serial arm in `size` bytes of the caller's memory, at least `armgap_chain_size_f32`. `joints` has one entry per joint,
+/// `columns` one per estimated parameter, strictly ascending: indices from 0 into ten numbers of each link (mass, first moments x, y, z, second
+/// moments xx, xy, yy, xz, yz, zz about the origin of the link's frame), then rotor inertias, viscous, Coulomb, and constant torques of all joints.
+/// `known` holds values of the first 13 numbers per joint, SI, used for those that are not estimated; optional, zeros by default. `theta0` holds one
+/// start value per estimated parameter; optional, zeros by default. Starting again is allowed at any time.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn armgap_chain_start_f32(
     memory: *mut c_void,
@@ -30,8 +30,8 @@ pub unsafe extern "C" fn armgap_chain_start_f32(
     unsafe { slot::start::<f32>(memory, size, settings, joints, columns, known, theta0) }
 }
 
-/// Takes one sample of a serial arm at time `t` [s]: positions, optional velocities, and the torques that act until the next sample, SI, each of `joints`
-/// entries. Whether velocities are given is settled by the first sample.
+/// Takes one sample of a serial arm at time `t` [s]: positions, optional velocities, and the torques that act until the next sample, SI, each of
+/// `joints` entries. Whether velocities are given is settled by the first sample.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn armgap_chain_update_f32(
     memory: *mut c_void,

@@ -1,4 +1,4 @@
-//! Estimator of a serial arm in memory of the caller's, of the smallest [`ChainSize`] that has room for it.
+//! Estimator of a serial arm in the caller's memory, of the smallest [`ChainSize`] that has room for the arm.
 
 use crate::chain::{ARMGAP_CHAIN_VERSION, armgap_chain_settings, armgap_joint};
 use crate::settings::{armgap_report, armgap_status, status_of};

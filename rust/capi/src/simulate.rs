@@ -8,7 +8,8 @@ use armgap_core::plant::Plant;
 use armgap_status::{ARMGAP_LENGTH, ARMGAP_NULL, ARMGAP_OK, ARMGAP_RANGE, ARMGAP_UNALIGNED};
 use nalgebra::SVector;
 
-/// Moves an `armgap_arm` with the parameters `theta` by `h` seconds under held torques `tau`, SI; positions `q` and velocities `dq` are read and written.
+/// Moves an `armgap_arm` with the parameters `theta` by `h` seconds under held torques `tau`, SI; positions `q` and velocities `dq` are read and
+/// written.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn armgap_advance(
     arm: u32,

@@ -11,8 +11,8 @@ pub struct armgap_estimator_f32 {
     pub opaque: [u64; 256],
 }
 
-/// Starts an estimator in the caller's memory; `size` is `sizeof(*estimator)`. `theta0` has `count` start values, SI, one per parameter, or is optional with
-/// `count` 0, which means zeros. Starting again is allowed at any time.
+/// Starts an estimator in the caller's memory; `size` is `sizeof(*estimator)`. `theta0` has `count` start values, SI, one per parameter, or is
+/// optional with `count` 0, which means zeros. Starting again is allowed at any time.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn armgap_start_f32(
     estimator: *mut armgap_estimator_f32,
@@ -24,8 +24,8 @@ pub unsafe extern "C" fn armgap_start_f32(
     unsafe { slot::start::<f32, _>(estimator, size, settings, theta0, count) }
 }
 
-/// Takes one sample at time `t` [s]: positions, optional velocities, and the torques that act until the next sample, SI, each of `joints` entries. Whether
-/// velocities are given is settled by the first sample.
+/// Takes one sample at time `t` [s]: positions, optional velocities, and the torques that act until the next sample, SI, each of `joints` entries.
+/// Whether velocities are given is settled by the first sample.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn armgap_update_f32(
     estimator: *mut armgap_estimator_f32,

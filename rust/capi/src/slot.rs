@@ -1,4 +1,4 @@
-//! Estimator of an arm of one or two joints in memory of the caller's.
+//! Estimator of an arm of one or two joints in the caller's memory.
 
 use crate::settings::{armgap_report, armgap_settings, armgap_status, status_of};
 use armgap_core::online::{MOST_JOINTS, MOST_PARAMETERS, Online, OnlineEstimator, SampleStatus, When};
@@ -123,7 +123,7 @@ pub(crate) fn outcome(status: SampleStatus) -> armgap_status {
     }
 }
 
-/// Copies numbers of the estimator to the caller's array, whose length `count` must be theirs.
+/// Copies the estimator's numbers `from` into the caller's array `to` of length `count`; error unless the lengths are equal.
 pub(crate) unsafe fn give<T: Real>(
     from: &[T],
     to: *mut T,

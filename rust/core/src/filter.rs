@@ -82,14 +82,15 @@ impl<T: Real> FilterCoefficients<T> {
         C::fused(self.last, to, C::fused(self.decay, y, self.first * from))
     }
 
-    /// Output of the low-pass filter `F` one interval after its output `y`, for a parabola from `from` to `to` that lies `height` above its chord at the
-    /// middle.
+    /// Output of the low-pass filter `F` one interval after its output `y`, for a parabola from `from` to `to` that lies `height` above its chord at
+    /// the middle.
     #[inline(always)]
     pub fn curve<C: Cpu>(&self, y: T, from: T, to: T, height: T) -> T {
         C::fused(self.bulge, height, self.ramp::<C>(y, from, to))
     }
 
-    /// Output of the derivative filter `D` as Reyes and Kelly (1997) print it, one interval after its output `y`, for an input that goes from `from` to `to`.
+    /// Output of the derivative filter `D` as Reyes and Kelly (1997) print it, one interval after its output `y`, for an input that goes from `from`
+    /// to `to`.
     #[inline(always)]
     pub fn paper_derivative<C: Cpu>(&self, y: T, from: T, to: T) -> T {
         C::fused(self.lambda, to - from, self.decay * y)

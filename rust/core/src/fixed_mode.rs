@@ -217,7 +217,8 @@ struct RkStage<V, const N: usize> {
     motion: StageMotion<V, N>,
 }
 
-/// Runge-Kutta stage `dt` seconds after the start, from velocities and accelerations of the previous stage; `tau` is the index of the torques in the span.
+/// Runge-Kutta stage `dt` seconds after the start, from velocities and accelerations of the previous stage; `tau` is the index of the torques in the
+/// span.
 #[inline(always)]
 fn rk_stage<V: Number, B: Dynamics<V, N>, const N: usize>(
     step: &FixedModeStep<'_, V, B, N>,
@@ -285,8 +286,8 @@ pub fn rk4_fixed_mode<V: Number, B: Dynamics<V, N>, const N: usize>(
     end(step, &s1, [&s2, &s3, &s4], far, mode_check)
 }
 
-/// End of a Runge-Kutta step from its stages; `far` is the largest angle between stages, `aside_far` the largest that has to be small, as parts of their
-/// ranges.
+/// Kinematic state at the end of a Runge-Kutta step from its stages, with the check of friction modes; `far` is the largest angle between stages as a
+/// part of [`AngleRange::Near`], `aside_far` the largest of the small angles between stages, rad, which [`AngleRange::Slight`] limits.
 #[inline(always)]
 fn end<V: Number, B: Dynamics<V, N>, const N: usize>(
     step: &FixedModeStep<'_, V, B, N>,

@@ -19,8 +19,8 @@ use crate::regression::{
 use crate::rls::{Form, Rls, Update};
 use nalgebra::SVector;
 
-/// Largest size, in SI units, of positions, velocities, torques and intervals that the online estimator takes: larger ones belong to no arm, and their
-/// squares would stay in filters and integrals for good.
+/// Largest size, in SI units, of positions, velocities, torques and intervals that the online estimator takes: larger ones belong to no arm, and
+/// their squares would stay in filters and integrals for good.
 const LARGEST: f64 = 1e9;
 /// Largest time of a sample that the online estimator takes, s; seconds since any epoch stay below.
 const LATEST: f64 = 1e11;
@@ -73,9 +73,9 @@ pub enum Outcome<T, const N: usize> {
     Starting,
     /// The estimate was updated; holds the prediction error, N m, J or W by scheme, in the first entry only for scalar schemes.
     Updated(SVector<T, N>),
-    /// Either the sample is not finite, of impossible size, not later than the last, or has a velocity where the first had none, or none where the first had
-    /// one; nothing but the count of rejected samples has changed. Or least squares rejected its regressor; the estimate is unchanged, and filters and
-    /// integrals start again at this sample.
+    /// Either the sample is not finite, of impossible size, not later than the last, or has a velocity where the first had none, or none where the
+    /// first had one; nothing but the count of rejected samples has changed. Or least squares rejected its regressor; the estimate is unchanged, and
+    /// filters and integrals start again at this sample.
     Rejected,
 }
 
@@ -86,7 +86,7 @@ enum Regression<T: Real, const N: usize, const P: usize> {
     Power(FilteredPower<T, N, P>),
 }
 
-/// Last sample, and what is needed of the sample before it; `seen` says which of the fields are set.
+/// Last sample that the online estimator used, with position and torque of the sample before; `seen` says which of the fields are set.
 #[derive(Debug, Clone, Copy)]
 struct Past<T, const N: usize> {
     seen: Seen,
@@ -180,7 +180,8 @@ impl<T: Real, A: Arm<T, N, P>, S: Columns<T, N, P, R>, const N: usize, const P: 
         self.rls.level().run(SampleKernel { estimator: self, t: *t, h, q, dq: dq.as_ref(), tau })
     }
 
-    /// Takes one sample of the arm's motion `h` seconds after the last one, and updates the estimate; `h` of the first sample may be any positive number.
+    /// Takes one sample of the arm's motion `h` seconds after the last one, and updates the estimate; `h` of the first sample may be any positive
+    /// number.
     #[inline]
     pub fn update_after(&mut self, h: T, reading: &Reading<T, N>) -> Outcome<T, N> {
         let Reading { q, dq, tau } = reading;

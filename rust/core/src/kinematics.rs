@@ -65,7 +65,8 @@ impl<V: Number, A: Arm<V::Real, N, P>, const N: usize, const P: usize> RigidArm<
 }
 
 impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> RigidArm<T, A, N, P> {
-    /// Kinematic state at the joint state `joints`, from sines and cosines known at the positions `q` if the angles between are within the range `reach`.
+    /// Kinematic state at the joint state `joints`, from sines and cosines known at the positions `q` if the angles between are within the range
+    /// `reach`.
     #[inline(always)]
     pub fn near(
         &self,

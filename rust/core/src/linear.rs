@@ -1,4 +1,4 @@
-//! Small symmetric positive definite systems, solved in place without a library's panics.
+//! Solution of small symmetric positive definite linear systems, in place and without panics.
 
 use crate::number::Number;
 use crate::real::lit;

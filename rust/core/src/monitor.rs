@@ -84,8 +84,8 @@ impl<T: Real, const N: usize> Monitor<T, N> {
         }
     }
 
-    /// Takes the prediction `error` of a used sample, its `leverage`, the number of estimated `parameters`, and the `age` of the estimate in samples, at most
-    /// its memory.
+    /// Takes the prediction `error` of a used sample, its `leverage`, the number of estimated `parameters`, and the `age` of the estimate in samples,
+    /// at most its memory.
     #[inline]
     pub fn update(&mut self, error: &SVector<T, N>, leverage: T, parameters: usize, age: T) {
         self.samples = self.samples.saturating_add(1);

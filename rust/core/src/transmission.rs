@@ -26,8 +26,8 @@ pub struct Transmission<T> {
     pub backlash: T,
     /// Whether the rotor's inertia is a part of the link's nominal inertia rather than an addition to it.
     pub part_of_link: bool,
-    /// Coupling ratio: rotor velocity per velocity of each joint before its own; 1 for a motor that sits on the previous link, about 0 behind a high gear
-    /// ratio.
+    /// Coupling ratio: rotor velocity per velocity of each joint before its own; 1 for a motor that sits on the previous link, about 0 behind a high
+    /// gear ratio.
     pub coupling_ratio: T,
 }
 
@@ -76,8 +76,8 @@ pub struct Sides {
     pub encoder_at_motor: bool,
     /// Whether friction acts on the motor rather than on the link.
     pub friction_at_motor: bool,
-    /// Whether the rotor turns as fast as its joint and moves with inner joints, as without a gear; behind a high gear ratio inner joints hardly matter. For
-    /// elastic transmissions; the coupling ratio of backlash is a parameter.
+    /// Whether the rotor turns as fast as its joint and moves with inner joints, as without a gear; behind a high gear ratio inner joints hardly
+    /// matter. For elastic transmissions; the coupling ratio of backlash is a parameter.
     pub rotor_rides: bool,
 }
 

@@ -365,7 +365,8 @@ fn agrees<const N: usize, const P: usize>(
     (motion, (0..N).all(holds))
 }
 
-/// Friction modes by a simple method: the joint with the largest stiction violation is released, one at a time, and held for good if it is pulled back.
+/// Friction modes by a simple method: the joint with the largest stiction violation is released, one at a time, and held for good if it is pulled
+/// back.
 fn one_at_a_time<const N: usize, const P: usize>(
     plant: &Plant<f64, Chain<f64, N>, N, P>,
     state: &State<f64, N>,

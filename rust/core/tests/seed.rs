@@ -25,7 +25,8 @@ fn theta() -> [f64; 9] {
     [a, b, c, d, e, 2.288, 0.175, f64::midpoint(7.17, 8.049), 1.734]
 }
 
-/// Samples of the run of Reyes and Kelly (1997) with true velocities and encoders of `counts` per turn; `asymmetry` turns on Table I's two Coulomb levels.
+/// Samples of the run of Reyes and Kelly (1997) with true velocities and encoders of `counts` per turn; `asymmetry` turns on Table I's two Coulomb
+/// levels.
 fn run(asymmetry: bool, counts: Option<[f64; 2]>) -> Vec<Sample<f64, 2>> {
     let theta = theta();
     let arm = TwoLink::new(9.81, Some(0.45), &theta);

@@ -89,7 +89,8 @@ pub struct ProgressReporter {
     planned: AtomicUsize,
     /// Units of work done in the current phase.
     done: AtomicUsize,
-    /// Fractions of the work, 0 to 1, at which the current phase begins and ends, and the largest one reported; as bits, which sort like positive numbers.
+    /// Fractions of the work, 0 to 1, at which the current phase begins and ends, and the largest one reported; as bits, which sort like positive
+    /// numbers.
     from: AtomicU64,
     to: AtomicU64,
     reported: AtomicU64,

@@ -6,7 +6,8 @@ use armgap_core::rls::Form;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-/// Typical, median, 99 %, 99.99 % and longest time of one sample of an online estimator, ns; without a scheme, of fixed arithmetic: the machine's noise.
+/// Typical, median, 99 %, 99.99 % and longest time of one sample of an online estimator, ns; without a scheme, of fixed arithmetic: the machine's
+/// noise.
 #[pyfunction]
 pub fn bench(
     py: Python<'_>,

@@ -208,8 +208,8 @@ impl Chain {
         self.description.parameters().into_iter().map(|(_, unit)| unit).collect()
     }
 
-    /// Base parameters among the candidates, by index, of which `13 n + j` is a constant torque of joint `j`: indices of estimated parameters, indices of
-    /// dependent ones, and the factor, (estimated, dependent), by which each dependent parameter adds to each estimated one.
+    /// Base parameters among the candidates, by index, of which `13 n + j` is a constant torque of joint `j`: indices of estimated parameters,
+    /// indices of dependent ones, and the factor, (estimated, dependent), by which each dependent parameter adds to each estimated one.
     fn base_parameters<'py>(
         &self,
         py: Python<'py>,

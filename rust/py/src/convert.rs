@@ -15,10 +15,13 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use std::collections::BTreeMap;
 
-/// Keys in the values of an effect with a transmission that say where encoder and friction sit, 1 at the motor, 0 at the link, and whether the rotor moves
-/// with inner joints.
+/// Key in the values of an effect with a transmission: 1 where the encoder is at the motor, 0 where it is at the link.
 const ENCODER_SIDE: &str = "encoder_at_motor";
+
+/// Key in the values of an effect with a transmission: 1 where friction acts on the motor, 0 where it acts on the link.
 const FRICTION_SIDE: &str = "friction_at_motor";
+
+/// Key in the values of an effect with a transmission: 1 where the rotor moves with inner joints, else 0.
 const ROTOR: &str = "rotor_rides";
 
 /// Kinds of arm with dynamics in closed form, as a list of dicts: name, joints, parameter names and units.

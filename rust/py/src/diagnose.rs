@@ -16,8 +16,8 @@ use pyo3::types::PyDict;
 /// Positions of a position controller's reference, rad or m, one row per sample, and velocities where they are logged.
 type PyReference<'py> = (PyReadonlyArray2<'py, f64>, Option<PyReadonlyArray2<'py, f64>>);
 
-/// A log: name, source, times, positions, torques, torques of custom effects, first moments of torques that are means over intervals, and the reference of a
-/// position controller where it is logged in place of torques.
+/// A log: name, source, times, positions, torques, torques of custom effects, first moments of torques that are means over intervals, and the
+/// reference of a position controller where it is logged in place of torques.
 type PyLog<'py> = (
     String,
     String,
@@ -41,8 +41,8 @@ struct Owned {
     reference: Option<(Vec<f64>, Option<Vec<f64>>)>,
 }
 
-/// Re-estimates the arm's parameters without effects, from the arm file's values and from `start`: `theta`, `sigma`, and on the holdout, per joint, the RMS
-/// errors `before` and `refit` and the RMS displacement `motion`, rad or m.
+/// Re-estimates the arm's parameters without effects, from the arm file's values and from `start`: `theta`, `sigma`, and on the holdout, per joint,
+/// the RMS errors `before` and `refit` and the RMS displacement `motion`, rad or m.
 #[pyfunction]
 pub fn refit<'py>(
     py: Python<'py>,
@@ -77,7 +77,7 @@ pub fn diagnosis_schema() -> PyResult<String> {
     serde_json::to_string(&schema()).map_err(|e| PyValueError::new_err(e.to_string()))
 }
 
-/// Diagnoses training and holdout logs and returns the result as JSON; `progress(title, fraction)` is called some times a second.
+/// Diagnoses training and holdout logs and returns the result as JSON; `progress(title, fraction)` is called several times a second.
 #[pyfunction]
 #[pyo3(signature = (arm, training, holdout, options, progress=None))]
 pub fn diagnose(

@@ -299,8 +299,8 @@ impl Estimator {
         Ok(code(self.any.update(when, q, dq, tau)))
     }
 
-    /// Takes many samples without the interpreter's lock; returns estimates and prediction errors after each sample, NaN where it gave none, and outcomes: 0
-    /// updated, 1 starting, 2 rejected.
+    /// Takes many samples without the interpreter's lock; returns estimates and prediction errors after each sample, NaN where it gave none, and
+    /// outcomes: 0 updated, 1 starting, 2 rejected.
     fn run<'py>(
         &mut self,
         py: Python<'py>,

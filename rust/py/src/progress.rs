@@ -26,8 +26,8 @@ struct Shared {
     stop: AtomicBool,
 }
 
-/// Runs `work` on its own thread and calls `callback(title, fraction)` with its progress. Without a callback, work is short: it runs on the calling thread
-/// without interruption.
+/// Runs `work` on its own thread and calls `callback(title, fraction)` with its progress. Without a callback, work is short: it runs on the calling
+/// thread without interruption.
 pub fn with_progress<T: Send + 'static>(
     py: Python<'_>,
     callback: Option<&Py<PyAny>>,

@@ -138,7 +138,7 @@ class _Resolver:
         self.tree = tree
         self.frozen = frozen
         self.still: dict[str, float] = {}
-        """Joints off the chain that nobody froze, and where they stand."""
+        """Positions [rad or m] of moving joints outside the chain for which no position was given, by name of the joint."""
         for name in frozen:
             if name not in tree.joints:
                 raise tree.error(None, f"has no joint `{name}` to freeze", suggest(name, self._movable()))

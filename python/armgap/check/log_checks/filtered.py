@@ -1,4 +1,4 @@
-"""Positions that are smoother than their encoder: low-passed, interpolated from a slower rate, or fitted.
+"""Positions that are smoother than an encoder can measure: low-passed, interpolated from a slower rate, or fitted.
 
 A raw encoder adds white noise, its step over the square root of 12 while the joint moves: normalised differences of every order give
 the same standard deviation of noise once motion has faded. A low-pass leaves less noise, and less by higher orders; interpolation leaves

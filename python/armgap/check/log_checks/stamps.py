@@ -25,7 +25,8 @@ Array = NDArray[np.float64]
 
 # Scatter of time stamps, in sample periods, below which they count as even.
 _EVEN = 0.01
-# Half of the error variance, in this share of the rows, where jitter shows most, has to be the stamps'; no joint may say the opposite.
+# Even times are better if they leave less than the first part of the stamps' error variance on some joint, and on no joint more than the second
+# number times it, in the share of rows (third number) where jitter shows most.
 _BETTER, _WORSE, _LOUD = 0.5, 1.2, 0.2
 # Correlation of position errors with the stamps' scatter, at most: 1 where stamps are right, 0 where even times are.
 _SHOWN = 0.15
@@ -156,7 +157,7 @@ def _missing(t: Array, steps: Array, period: float) -> NDArray[np.intp]:
 
 
 def _settled(missing: NDArray[np.intp], late: Array, steps: Array, period: float) -> NDArray[np.intp]:
-    """Return missing rows after a second pass: stamps between two long steps are moved by the whole periods by which they are late."""
+    """Return the numbers of missing rows after a second pass, which moves stamps between two long steps by the whole periods of their lateness."""
     if not missing.any():
         return missing
     edges = np.append(0, np.flatnonzero((steps > _LONG * period) | (missing > 0)) + 1)

@@ -71,7 +71,7 @@ class _Writer:
         self.model = model
         self.remarks: list[str] = []
         self.angle = math.degrees(1.0) if spec.compiler.degree else 1.0
-        """Of the file's unit of angles in a radian."""
+        """Size of one radian in the file's unit of angles: degrees or radians."""
 
     def inertias(self, inertial: Mapping[str, Array], tree: Tree) -> None:
         bodies = {body.name or f"body{body.id}": body for body in self.spec.bodies}

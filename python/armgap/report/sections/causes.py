@@ -15,7 +15,7 @@ __all__ = ["candidates", "evidence", "look_alikes", "ranking", "unnamed"]
 
 #: Smallest share of the gap that is shown; smaller shares are shown as this value.
 _WORST_SHARE = -9.99
-#: Explained share of evidence from which it is written as "all".
+#: Share of a cause's evidence that the law explains from which reports write "all".
 ALL = 0.995
 #: Candidates of the ranking that are shown unfolded.
 SHOWN = 8

@@ -27,7 +27,7 @@ from armgap.trial.simulation.simulated_arm import SimulatedArm, Trace, run
 ATTEMPTS = 30
 #: Steps by which an invisible hidden effect is made larger at most, and increase of its size per step.
 GROWTHS, _GROWTH = 8, 0.15
-#: One hidden effect in so many is made as small as is still visible, in at most so many steps of this reduction.
+#: One of this many hidden effects is shrunk for as long as it stays visible; largest number of steps, and decrease of its size per step.
 SHRUNK_ONE_IN, _SHRINKS, SHRINK = 5, 6, 0.4
 #: Position and speed beyond which a simulated arm counts as diverged, rad and rad/s (m and m/s).
 _REACH, SPEED = 10.0, 30.0

@@ -1,4 +1,4 @@
-//! A chain as an arm with parameters: ten of each link, rotor inertias, viscous and Coulomb friction.
+//! Implementation of [`Arm`] for a chain, with ten inertial parameters of each link, rotor inertias, viscous and Coulomb friction.
 //!
 //! `theta` has 13 entries per joint: the ten inertial parameters of each link, link by link ([`LinkInertia`]), then one rotor inertia per
 //! joint (kg m^2 at the joint, on the diagonal of the inertia matrix), then viscous, then Coulomb coefficients. Names and units are those
@@ -20,7 +20,7 @@ fn links_of<V, const N: usize, const P: usize>(theta: &[V; P]) -> Option<&[LinkI
     theta.as_chunks().0.first_chunk()
 }
 
-/// Index in `theta` of the rotor inertia of joint 1.
+/// Index in `theta` of the rotor inertia of the first joint, for a chain of `joints` joints.
 const fn first_rotor(joints: usize) -> usize {
     LINK_PARAMETERS * joints
 }
@@ -31,7 +31,7 @@ const fn check<const N: usize, const P: usize>() {
     const { assert!(P == PARAMETERS_PER_JOINT * N, "a chain has 13 parameters per joint") }
 }
 
-/// Writes `row` over the ten parameters of link `k` into row `i` of a regressor.
+/// Writes `row`, over the ten parameters of link `k`, into row `i` of the regressor `matrix`.
 #[inline(always)]
 fn put<T: Real, const N: usize, const P: usize>(
     matrix: &mut SMatrix<T, N, P>,
@@ -46,7 +46,7 @@ fn put<T: Real, const N: usize, const P: usize>(
     }
 }
 
-/// Writes `of[j]`, for every joint `j`, into the column of rotor inertia `j` of a regressor.
+/// Writes `of[j]`, for every joint `j`, into the column of that joint's rotor inertia in the regressor `matrix`.
 #[inline(always)]
 fn put_rotors<T: Real, const N: usize, const P: usize>(matrix: &mut SMatrix<T, N, P>, of: &SVector<T, N>) {
     for j in 0..N {
@@ -57,7 +57,7 @@ fn put_rotors<T: Real, const N: usize, const P: usize>(matrix: &mut SMatrix<T, N
 }
 
 impl<T: Real, const N: usize> Chain<T, N> {
-    /// Inertia matrix and bias in a function that is not inlined: the integrator has a dozen calls of them.
+    /// [`Arm::equation_terms`] as a function that is not inlined: the integrator calls it in a dozen places.
     #[inline(never)]
     fn equation_terms_apart<V: Number<Real = T>>(
         &self,
@@ -98,7 +98,8 @@ impl<T: Real, const N: usize, const P: usize> Arm<T, N, P> for Chain<T, N> {
         SMatrix::from_fn(|i, j| own[i][j] + rotors[i][j])
     }
 
-    /// Coriolis matrix `C(q, dq)` of Christoffel's symbols, from the products `C(x) x` of sums and differences of velocities `x`.
+    /// Coriolis matrix `C(q, dq)` of Christoffel symbols: column `j` is a quarter of `C(dq + e_j) (dq + e_j) - C(dq - e_j) (dq - e_j)`, `e_j` a unit
+    /// vector.
     fn coriolis(&self, theta: &[T; P], q: &SVector<T, N>, dq: &SVector<T, N>) -> SMatrix<T, N, N> {
         let (mut matrix, quarter) = (SMatrix::<T, N, N>::zeros(), lit::<T>(0.25));
         for j in 0..N {
@@ -110,7 +111,7 @@ impl<T: Real, const N: usize, const P: usize> Arm<T, N, P> for Chain<T, N> {
         matrix
     }
 
-    /// Gravity torque `g(q)`, N m (N); `tilt` is ignored, for a chain has a gravity vector.
+    /// Gravity torque `g(q)`, N m (N); the tilt is ignored, as the base of a chain is tilted by its gravity vector.
     fn gravity(&self, theta: &[T; P], q: &SVector<T, N>, _tilt: T) -> SVector<T, N> {
         let still = [T::zero(); N];
         links_of(theta)
@@ -190,7 +191,7 @@ impl<T: Real, const N: usize, const P: usize> Arm<T, N, P> for Chain<T, N> {
         matrix
     }
 
-    /// Change of `theta` by a point mass, kg, at `distance`, m, on the z axis of the last link's frame; for a point mass off the axis see
+    /// Change of `theta` by a point mass `mass`, kg, at `distance`, m, on the z axis of the last link's frame; for a point mass off the axis see
     /// [`point_mass`].
     fn payload(&self, _theta: &[T; P], mass: T, distance: T) -> [T; P] {
         let (mut delta, load) = ([T::zero(); P], point_mass(mass, [T::zero(), T::zero(), distance]));

@@ -1,11 +1,12 @@
-//! Derivatives of the torques of a motion by positions and velocities.
+//! Derivatives of inverse dynamics: of the joint torques by positions, velocities and accelerations.
 //!
-//! A joint that moves by `dq_i` carries all outer links with it as one body; relative to them the motion of the inner links changes. With
-//! the motion subspace `S` of the joint, `S' = v x S` and `S'' = a x S + v x S'`, `v` and `a` of the parent link, outer link `k` needs
-//! `S x* f_k + I_k S'' + 2 B_k S'` more force per joint position and `2 (I_k S' + B_k S)` per joint velocity, where
-//! `2 B_k x = v_k x* I_k x + x x* I_k v_k - I_k (v_k x x)` (Singh, Russell and Wensing 2022). In the axes of the base frame `B_k` has twelve
-//! numbers: the force `x_w x p`, `p` the linear momentum, and the moment `G x_w`, `G = -[w x] Sigma - [h x] [v x]`, `x_w` the angular part
-//! of `x`, `Sigma` second and `h` first moments of mass. The operators `B_k` of several links add up.
+//! A small displacement of joint `i` moves all outer links as one body. With the motion subspace `S` of the joint, `S' = v x S` and `S'' = a x S + v
+//! x S'`, `v` and `a` velocity and acceleration of the joint's parent link, the force on outer link `k` changes by `S x* f_k + I_k S'' + 2 B_k S'`
+//! per joint position and by `2 (I_k S' + B_k S)` per joint velocity, where `f_k` is the force on link `k`, `I_k` its spatial inertia, `v_k` its
+//! velocity, and `2 B_k x = v_k x* I_k x + x x* I_k v_k - I_k (v_k x x)` (Singh, Russell and Wensing 2022). In the axes of the base frame `B_k` has
+//! twelve numbers: `B_k x` is the force `x_w x p`, `p` the linear momentum, and the moment `G x_w`, `G = -[w x] Sigma - [h x] [v x]`, `x_w` the
+//! angular part of `x`, `w` and `v` angular and linear velocity of the link, `Sigma` and `h` its second and first moments of mass. The operators
+//! `B_k` of several links add up.
 
 use super::Chain;
 use super::dynamics::InertiaMatrix;
@@ -30,7 +31,8 @@ pub struct TorqueDerivatives<V, const N: usize> {
     pub by_acceleration: InertiaMatrix<V, N>,
 }
 
-/// Operator `B` of one or several links (Singh, Russell and Wensing 2022): `2 B x = v x* I x + x x* I v - I (v x x)`.
+/// Operator `B` of one or several links (Singh, Russell and Wensing 2022): `2 B x = v x* I x + x x* I v - I (v x x)`, `v` the velocity of a link and
+/// `I` its spatial inertia, as the matrix of the moment and the linear momentum.
 #[derive(Clone, Copy)]
 struct VelocityOperator<V> {
     moment: Matrix3<V>,
@@ -43,7 +45,7 @@ impl<V: Number> VelocityOperator<V> {
         Self { moment: [[zero(); 3]; 3], momentum: [zero(); 3] }
     }
 
-    /// Operator `B` of a body with this inertia and velocity.
+    /// Operator `B` of a link with this spatial inertia and velocity.
     #[inline(always)]
     fn of(inertia: &SpatialInertia<V>, velocity: &Twist<V>) -> Self {
         let (Twist { angular: w, linear: v }, h) = (velocity, &inertia.first);
@@ -86,7 +88,7 @@ impl<V: Number> VelocityOperator<V> {
 }
 
 impl<T: Real, const N: usize> Chain<T, N> {
-    /// Joint torques of a motion `[q, dq, ddq]`, SI, and their derivatives.
+    /// Joint torques of a motion `[q, dq, ddq]`, SI, by inverse dynamics, and their derivatives; `links` are the links' inertial parameters.
     #[inline(always)]
     pub fn torque_derivatives<V: Number<Real = T>>(
         &self,
@@ -123,13 +125,13 @@ impl<T: Real, const N: usize> Chain<T, N> {
             let joint = &poses[j].joint;
             all.torque[j] = joint.dot(&force);
             let momentum = inertia.times(joint);
-            // Of the motion of this joint on itself and on joints inwards.
+            // Derivatives by this joint, of its own torque and of the torques of inner joints.
             let by_velocity = inertia.times(&first[j]).plus(&operator.times(joint));
             let by_position = joint
                 .cross_force(&force)
                 .plus(&inertia.times(&second[j]))
                 .plus(&operator.times(&first[j]).scaled(two));
-            // Of the motion of joints inwards on this one.
+            // Derivatives of this joint's torque by inner joints.
             let transposed = scaled(two, &operator.transposed(joint));
             for i in (0..N).take(j + 1) {
                 let inner = &poses[i].joint;

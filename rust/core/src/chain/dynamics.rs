@@ -28,7 +28,7 @@ impl<T: Real, const N: usize> Chain<T, N> {
         composite_inertia(&poses, &mut inertia, &[[zero(); N]; N])
     }
 
-    /// Joint torques of a motion by inverse dynamics: `M ddq + C dq + g`, `(N,)`, N m (N).
+    /// Joint torques of a motion by inverse dynamics, `M ddq + C dq + g`, `(N,)`, N m (N), of a chain with the inertial parameters `links`.
     #[inline(always)]
     pub fn inverse_dynamics<V: Number<Real = T>>(
         &self,
@@ -46,14 +46,14 @@ impl<T: Real, const N: usize> Chain<T, N> {
         joint_torques(&poses, &mut forces)
     }
 
-    /// Bias `C dq + g`, `(N,)`, N m (N): joint torques of a motion without acceleration.
+    /// Bias `C dq + g`, `(N,)`, N m (N), of a chain with the inertial parameters `links`: joint torques of a motion without acceleration.
     #[inline(always)]
     pub fn bias<V: Number<Real = T>>(&self, links: &[LinkInertia<V>; N], q: &[V; N], dq: &[V; N]) -> [V; N] {
         self.equation_terms_at(&self.poses(q), links, &[[zero(); N]; N], dq).bias
     }
 
-    /// Joint accelerations, `(N,)`, rad/s^2 (m/s^2), under the torques `tau` without friction, by `L D L'` factors of `M(q)` plus
-    /// `constant_inertia`.
+    /// Joint accelerations, `(N,)`, rad/s^2 (m/s^2), under the joint torques `tau`, N m (N), without friction; `constant_inertia`, such as rotor
+    /// inertias, is added to `M(q)`, which is factored as `L D L'`.
     #[inline(always)]
     pub fn forward_dynamics<V: Number<Real = T>>(
         &self,
@@ -70,7 +70,7 @@ impl<T: Real, const N: usize> Chain<T, N> {
         solve_positive_definite(inertia, right)
     }
 
-    /// Kinetic energy of the links, J.
+    /// Kinetic energy of the links, J, without that of rotors.
     #[inline(always)]
     pub fn links_kinetic_energy<V: Number<Real = T>>(
         &self,
@@ -103,7 +103,7 @@ impl<T: Real, const N: usize> Chain<T, N> {
         energy
     }
 
-    /// Inertia matrix, plus `constant_inertia`, and bias `C dq + g` at known link poses.
+    /// Inertia matrix plus `constant_inertia`, and bias `C dq + g`, at known link poses.
     #[inline(always)]
     pub(super) fn equation_terms_at<V: Number<Real = T>>(
         &self,
@@ -122,14 +122,14 @@ impl<T: Real, const N: usize> Chain<T, N> {
         EquationTerms { inertia: composite_inertia(poses, &mut inertia, constant_inertia), bias }
     }
 
-    /// Motion of the base: at rest, with gravity as an acceleration in the opposite direction.
+    /// Motion of the base: at rest, with the acceleration `-g`, so that the links' weights appear as inertia forces.
     #[inline(always)]
     pub(super) fn base_motion<V: Number<Real = T>>(&self) -> LinkMotion<V> {
         let acceleration = Twist { angular: [zero(); 3], linear: negative(&of(&self.gravity)) };
         LinkMotion { velocity: Twist::zero(), acceleration }
     }
 
-    /// Velocities and accelerations of all links; without `ddq` the joints do not accelerate.
+    /// Spatial velocities and accelerations of all links; without `ddq` the joint accelerations are zero.
     #[inline(always)]
     pub(super) fn motions<V: Number<Real = T>>(
         &self,
@@ -153,7 +153,7 @@ impl<T: Real, const N: usize> Chain<T, N> {
     }
 }
 
-/// Spatial velocity of a link, and its spatial acceleration less that of gravity, in the base frame.
+/// Spatial velocity of a link, and its spatial acceleration minus gravity, in the base frame.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct LinkMotion<V> {
     pub(super) velocity: Twist<V>,
@@ -161,7 +161,7 @@ pub(super) struct LinkMotion<V> {
 }
 
 impl<V: Number> LinkMotion<V> {
-    /// Force that a link of this inertia needs for its motion, its weight included.
+    /// Spatial force that a link with this spatial inertia needs for its motion and its weight.
     #[inline(always)]
     pub(super) fn force(&self, inertia: &SpatialInertia<V>) -> Wrench<V> {
         let rate = self.velocity.cross_force(&inertia.times(&self.velocity));
@@ -169,7 +169,7 @@ impl<V: Number> LinkMotion<V> {
     }
 }
 
-/// Joint torques, N m (N), for `forces` on single links; `forces` become the sums over each link and all outer ones.
+/// Joint torques, N m (N), for the spatial forces on each link; on return `forces[j]` is the sum over link `j` and all outer links.
 #[inline(always)]
 pub(super) fn joint_torques<V: Number, const N: usize>(
     poses: &[LinkPose<V>; N],
@@ -184,7 +184,8 @@ pub(super) fn joint_torques<V: Number, const N: usize>(
     torques
 }
 
-/// Inertia matrix for `inertia` of single links, by composite rigid bodies; `inertia` become the sums over each link and all outer ones.
+/// Inertia matrix by the composite rigid body algorithm plus `constant_inertia`, from the spatial inertia of each link; on return `inertia[j]` is the
+/// sum over link `j` and all outer links.
 #[inline(always)]
 pub(super) fn composite_inertia<V: Number, const N: usize>(
     poses: &[LinkPose<V>; N],

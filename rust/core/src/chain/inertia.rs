@@ -25,20 +25,20 @@ pub(super) struct SpatialInertia<V> {
 }
 
 impl<V: Number> SpatialInertia<V> {
-    /// Spatial inertia of a link without mass.
+    /// Zero spatial inertia, of no body.
     #[inline(always)]
     pub(super) fn zero() -> Self {
         Self { mass: zero(), first: [zero(); 3], second: [zero(); 6] }
     }
 
-    /// Spatial inertia, in the base frame, of a link at `pose`.
+    /// Spatial inertia, in the base frame, of a link at `pose` with the inertial parameters `link`.
     #[inline(always)]
     pub(super) fn of(link: &LinkInertia<V>, pose: &LinkPose<V>) -> Self {
         let [mass, hx, hy, hz, xx, xy, yy, xz, yz, zz] = *link;
         let (r, p) = (&pose.rotation, &pose.position);
         let first = turned(r, &[hx, hy, hz]);
         let half = product(r, &[[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]);
-        // Parallel axes: `2 (p.u) 1 - p u' - u p'` with `u` the first moments and half of what they change by.
+        // Parallel axis theorem: `2 (p.u) 1 - p u' - u p'`, `p` the position and `u` the first moments plus half of their change by `p`.
         let u = scaled_plus(mass * V::of(lit(0.5)), p, &first);
         let along = [p[0] * u[0], p[1] * u[1], p[2] * u[2]];
         let twice = V::of(lit(2.0));
@@ -57,7 +57,7 @@ impl<V: Number> SpatialInertia<V> {
         }
     }
 
-    /// Spatial inertia of two bodies that move as one.
+    /// Spatial inertia of two rigidly connected bodies.
     #[inline(always)]
     pub(super) fn plus(&self, other: &Self) -> Self {
         let mut second = self.second;
@@ -74,7 +74,7 @@ impl<V: Number> SpatialInertia<V> {
         [dot(&[xx, xy, xz], x), dot(&[xy, yy, yz], x), dot(&[xz, yz, zz], x)]
     }
 
-    /// Spatial momentum at a velocity, or spatial force for an acceleration.
+    /// Spatial inertia times a spatial velocity (momentum) or acceleration (force).
     #[inline(always)]
     pub(super) fn times(&self, motion: &Twist<V>) -> Wrench<V> {
         Wrench {
@@ -84,7 +84,7 @@ impl<V: Number> SpatialInertia<V> {
     }
 }
 
-/// Ten inertial parameters of a point mass, kg, at the position `at`, m, in the link frame.
+/// Ten inertial parameters of a point mass `mass`, kg, at the position `at`, m, in the link frame.
 pub fn point_mass<V: Number>(mass: V, at: Vector3<V>) -> LinkInertia<V> {
     let [x, y, z] = at;
     let [hx, hy, hz] = scaled(mass, &at);

@@ -79,7 +79,7 @@ impl<T: Real, const N: usize> Chain<T, N> {
         angles
     }
 
-    /// Poses of all links, given sines and cosines of the revolute joints' positions and the positions `q`, rad or m.
+    /// Poses of all links at the joint positions `q`, rad or m, given the sines and cosines of [`Self::angles_of`].
     #[inline(always)]
     pub(super) fn poses_at<V: Number<Real = T>>(
         &self,

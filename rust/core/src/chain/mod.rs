@@ -1,11 +1,11 @@
 //! Serial arms of any number of revolute and prismatic joints: open chains of rigid links.
 //!
-//! Poses, velocities, forces and inertias are spatial vectors and matrices at one point, the origin of the base frame, in the axes of the
-//! base frame (Featherstone 2008, section 2): links add up without transformations. The inertia matrix is that of the composite rigid
-//! body algorithm (section 6.2), bias and inverse dynamics are recursive Newton-Euler (section 5.3). Scalars are a
-//! [`crate::number::Number`]: of one chain or of several side by side.
+//! Poses, velocities, forces and inertias are spatial vectors and matrices at the origin of the base frame, in the axes of the base frame
+//! (Featherstone 2008, section 2), so that those of several links add up without transformations. The inertia matrix follows from the composite rigid
+//! body algorithm (section 6.2), bias and inverse dynamics from the recursive Newton-Euler algorithm (section 5.3). Scalars are a
+//! [`crate::number::Number`]: of one chain, or of several side by side.
 //!
-//! Friction, effects and stick-slip come with [`crate::plant::Plant`], for a [`Chain`] is an [`crate::arm::Arm`] too.
+//! [`crate::plant::Plant`] adds friction with stick-slip and effects to a [`Chain`], which is an [`crate::arm::Arm`].
 
 mod arm;
 mod derivatives;
@@ -57,7 +57,8 @@ pub struct Chain<T, const N: usize> {
     joints: [ChainJoint<T>; N],
     gravity: Vector3<T>,
     constants: [JointConstants<T>; N],
-    /// At `q = 0`, for each link: product of gravity and the position of its frame's origin, m^2/s^2, and gravity in its frame, m/s^2.
+    /// For each link at `q = 0`: scalar product of gravity and the position of the link frame's origin, m^2/s^2, and gravity in the axes of the link
+    /// frame, m/s^2.
     reference: [(T, Vector3<T>); N],
 }
 
@@ -86,7 +87,8 @@ impl<T: Real, const N: usize> Chain<T, N> {
         Self::new(self.joints, gravity)
     }
 
-    /// For each link at `q`: product of gravity and the position of its frame's origin, m^2/s^2, and gravity in its frame, m/s^2.
+    /// For each link at `q`: scalar product of gravity and the position of the link frame's origin, m^2/s^2, and gravity in the axes of the link
+    /// frame, m/s^2.
     fn gravity_along(&self, q: &[T; N]) -> [(T, Vector3<T>); N] {
         let along = |pose: LinkPose<T>| {
             (vector::dot(&self.gravity, &pose.position), vector::turned_back(&pose.rotation, &self.gravity))

@@ -1,4 +1,4 @@
-//! Names and units of a chain's parameters, which depend on the number of joints and their kinds.
+//! Names and units of a chain's parameters, which depend on the number and the kinds of its joints.
 
 use super::JointKind;
 use super::inertia::LINK_PARAMETERS;

@@ -1,8 +1,9 @@
-//! Regressors of a chain: rows over the ten inertial parameters of each link.
+//! Regressors of a chain: rows by which torques, momenta and energies are linear in the ten inertial parameters of each link.
 //!
-//! With the velocity `v`, the classical acceleration less gravity `a`, the angular velocity `w` and acceleration `alpha` of a link's origin
-//! in the axes of its frame, the link needs the force `m a + (alpha x + w x w x) h` and about its origin the moment
-//! `h x a + I alpha + w x I w` (Siciliano 2009, section 7.2). A row is their power at the motion subspace of a joint.
+//! For the origin of a link's frame, with `a` the classical acceleration less gravity, `w` the angular velocity and `alpha` the angular acceleration,
+//! in the axes of the link frame, the link needs the force `m a + (alpha x + w x w x) h` and about the origin the moment `h x a + I alpha + w x I w`,
+//! `m` mass, `h` first and `I` second moments (Siciliano 2009, section 7.2). A torque row is the power of this force and moment along the motion
+//! subspace of a joint.
 
 use super::Chain;
 use super::inertia::LinkInertia;
@@ -12,8 +13,8 @@ use crate::number::Number;
 use crate::real::{Real, lit};
 
 impl<T: Real, const N: usize> Chain<T, N> {
-    /// Torque regressor: `put(i, k, row)` for every joint `i` and link `k >= i`, so that the sum over `k` of `row . links[k]` is the torque
-    /// of joint `i` by [`Chain::inverse_dynamics`]. Inner links, `k < i`, do not load the joint.
+    /// Torque regressor at a motion `[q, dq, ddq]`: calls `put(i, k, row)` for every joint `i` and link `k >= i`, such that the sum over `k` of `row
+    /// . links[k]` is the torque of joint `i` by [`Chain::inverse_dynamics`]. Inner links, `k < i`, do not load joint `i`.
     #[inline(always)]
     pub fn torque_regressor<V: Number<Real = T>>(
         &self,
@@ -42,8 +43,8 @@ impl<T: Real, const N: usize> Chain<T, N> {
         }
     }
 
-    /// Regressors of the momentum `M dq` and of `g - dK/dq`: `put(i, k, momentum, potential)` for every joint `i` and link `k >= i`. The rate of
-    /// the momentum plus `g - dK/dq` is the torque.
+    /// Regressors of the momentum `M dq` and of `g - dK/dq`, `K` the kinetic energy: calls `put(i, k, momentum, potential)` for every joint `i` and
+    /// link `k >= i`. The time derivative of the momentum plus `g - dK/dq` is the torque.
     #[inline(always)]
     pub fn momentum_regressors<V: Number<Real = T>>(
         &self,
@@ -62,7 +63,7 @@ impl<T: Real, const N: usize> Chain<T, N> {
             for i in (0..N).take(k + 1) {
                 let joint = in_link(&poses[i].joint, &poses[k]);
                 let momentum = momentum_row(&joint, &velocity);
-                // What a motion adds to a momentum by turning its subspace is no force.
+                // `dK/dq_i` is the momentum along the rate of joint `i`'s motion subspace.
                 let mut potential = momentum_row(&in_link(&rates[i], &poses[k]), &velocity).map(|x| -x);
                 let weight = cross(&g, &joint.angular);
                 potential[0] = potential[0] - dot(&g, &joint.linear);
@@ -74,7 +75,7 @@ impl<T: Real, const N: usize> Chain<T, N> {
         }
     }
 
-    /// Regressor of the links' energy above rest at `q = 0`, J: row `k` times `links[k]`, summed over all links.
+    /// Regressor of the links' kinetic and potential energy, J, zero at rest at `q = 0`: row `k` times `links[k]`, summed over all links.
     #[inline(always)]
     pub fn links_energy_regressor<V: Number<Real = T>>(
         &self,
@@ -108,7 +109,7 @@ impl<T: Real, const N: usize> Chain<T, N> {
     }
 }
 
-/// Motion vector at the origin of a link's frame and in the axes of the link, from one at the origin of the base frame.
+/// Spatial motion vector at the origin of a link's frame in the axes of the link, from `motion` at the origin of the base frame.
 #[inline(always)]
 fn in_link<V: Number>(motion: &Twist<V>, pose: &LinkPose<V>) -> Twist<V> {
     let at_origin = cross_plus(&motion.angular, &pose.position, &motion.linear);
@@ -118,7 +119,7 @@ fn in_link<V: Number>(motion: &Twist<V>, pose: &LinkPose<V>) -> Twist<V> {
     }
 }
 
-/// Row over a link's ten parameters: power of the momentum of the link at `velocity` in the motion `joint`.
+/// Momentum of a link along the motion subspace `joint` as a row over the link's ten inertial parameters; the link moves at `velocity`.
 #[inline(always)]
 fn momentum_row<V: Number>(joint: &Twist<V>, velocity: &Twist<V>) -> LinkInertia<V> {
     let (w, own) = (&velocity.angular, &joint.angular);
@@ -138,7 +139,8 @@ fn momentum_row<V: Number>(joint: &Twist<V>, velocity: &Twist<V>) -> LinkInertia
     ]
 }
 
-/// Matrix `[alpha x] + [w x] [w x]`, which times the first moments of a link is the force on it.
+/// Matrix `[alpha x] + [w x] [w x]`: times the first moments of a link, the force due to them at angular velocity `w` and angular acceleration
+/// `alpha`.
 #[inline(always)]
 fn first_moments_force<V: Number>(w: &Vector3<V>, alpha: &Vector3<V>) -> [Vector3<V>; 3] {
     let [[xx, xy, xz], [_, yy, yz], [_, _, zz]] = squares(w);

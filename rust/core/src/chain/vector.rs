@@ -1,6 +1,6 @@
-//! Vectors and matrices of three numbers, and spatial vectors, over one number or several side by side.
+//! Vectors of 3, matrices of 3 by 3, and spatial vectors, whose entries are a [`Number`]: one number, or several side by side.
 //!
-//! Spatial vectors are those of Featherstone 2008, chapter 2, all at one point, the origin of the base frame, in the axes of the base frame.
+//! Spatial vectors are those of Featherstone 2008, chapter 2, at the origin of the base frame and in the axes of the base frame.
 
 use crate::number::Number;
 use crate::real::lit;
@@ -11,13 +11,13 @@ pub type Vector3<V> = [V; 3];
 /// Matrix of three by three numbers, by rows.
 pub type Matrix3<V> = [[V; 3]; 3];
 
-/// The number zero in every lane.
+/// Zero in every lane.
 #[inline(always)]
 pub(super) fn zero<V: Number>() -> V {
     V::of(lit(0.0))
 }
 
-/// Vector `x` in every lane.
+/// The vector `x` in every lane.
 #[inline(always)]
 pub(super) fn of<V: Number>(x: &Vector3<V::Real>) -> Vector3<V> {
     [V::of(x[0]), V::of(x[1]), V::of(x[2])]
@@ -71,19 +71,19 @@ pub(super) fn cross_plus<V: Number>(a: &Vector3<V>, b: &Vector3<V>, c: &Vector3<
     ]
 }
 
-/// Product `m x` of a matrix and a vector.
+/// Product `m x` of the matrix `m` and the vector `x`.
 #[inline(always)]
 pub(super) fn turned<V: Number>(m: &Matrix3<V>, x: &Vector3<V>) -> Vector3<V> {
     [dot(&m[0], x), dot(&m[1], x), dot(&m[2], x)]
 }
 
-/// Product `m' x` of a transposed matrix and a vector.
+/// Product `m' x` of the transposed matrix `m` and the vector `x`.
 #[inline(always)]
 pub(super) fn turned_back<V: Number>(m: &Matrix3<V>, x: &Vector3<V>) -> Vector3<V> {
     scaled_plus(x[0], &m[0], &scaled_plus(x[1], &m[1], &scaled(x[2], &m[2])))
 }
 
-/// Product `a b` of two matrices.
+/// Product `a b` of two 3 by 3 matrices.
 #[inline(always)]
 pub(super) fn product<V: Number>(a: &Matrix3<V>, b: &Matrix3<V>) -> Matrix3<V> {
     [turned_back(b, &a[0]), turned_back(b, &a[1]), turned_back(b, &a[2])]
@@ -99,13 +99,13 @@ pub struct Twist<V> {
 }
 
 impl<V: Number> Twist<V> {
-    /// Zero motion vector.
+    /// Zero spatial motion vector.
     #[inline(always)]
     pub fn zero() -> Self {
         Self { angular: [zero(); 3], linear: [zero(); 3] }
     }
 
-    /// Motion vector `s self + other`.
+    /// Spatial motion vector `s self + other`.
     #[inline(always)]
     pub(super) fn scaled_plus(&self, s: V, other: &Self) -> Self {
         Self {
@@ -114,7 +114,7 @@ impl<V: Number> Twist<V> {
         }
     }
 
-    /// Rate of change of the motion vector `other` fixed in a body that moves at the velocity `self`: `self x other`.
+    /// Spatial cross product `self x other`: rate of the motion vector `other` fixed in a body that moves at the spatial velocity `self`.
     #[inline(always)]
     pub(super) fn cross(&self, other: &Self) -> Self {
         Self {
@@ -123,7 +123,7 @@ impl<V: Number> Twist<V> {
         }
     }
 
-    /// Rate of change of the vector `force` fixed in a body that moves at the velocity `self`: `self x* force`.
+    /// Spatial cross product `self x* force`: rate of the force vector `force` fixed in a body that moves at the spatial velocity `self`.
     #[inline(always)]
     pub(super) fn cross_force(&self, force: &Wrench<V>) -> Wrench<V> {
         Wrench {
@@ -132,35 +132,35 @@ impl<V: Number> Twist<V> {
         }
     }
 
-    /// Power of `force` at the velocity `self`, W.
+    /// Power of the spatial force `force` at the spatial velocity `self`, W.
     #[inline(always)]
     pub(super) fn dot(&self, force: &Wrench<V>) -> V {
         dot(&self.angular, &force.moment) + dot(&self.linear, &force.force)
     }
 }
 
-/// Spatial force vector: a force with its moment, or a momentum.
+/// Spatial force vector: a moment and a force, or an angular and a linear momentum.
 #[derive(Debug, Clone, Copy)]
 pub struct Wrench<V> {
-    /// Moment about the origin of the base frame, N m, or of a momentum, kg m^2/s.
+    /// Moment about the origin of the base frame, N m; of a momentum the angular momentum, kg m^2/s.
     pub moment: Vector3<V>,
-    /// Linear part of the force vector, N, or of a momentum, kg m/s.
+    /// Force, N; of a momentum the linear momentum, kg m/s.
     pub force: Vector3<V>,
 }
 
 impl<V: Number> Wrench<V> {
-    /// Zero force vector.
+    /// Zero spatial force vector.
     #[inline(always)]
     pub fn zero() -> Self {
         Self { moment: [zero(); 3], force: [zero(); 3] }
     }
 
-    /// Force vector `self + other`.
+    /// Spatial force vector `self + other`.
     #[inline(always)]
     pub(super) fn plus(&self, other: &Self) -> Self {
         Self { moment: add(&self.moment, &other.moment), force: add(&self.force, &other.force) }
     }
-    /// Force vector `s self`.
+    /// Spatial force vector `s self`.
     #[inline(always)]
     pub(super) fn scaled(&self, s: V) -> Self {
         Self { moment: scaled(s, &self.moment), force: scaled(s, &self.force) }

@@ -4,8 +4,8 @@ use crate::real::{Real, lit};
 
 /// Torque over one sample interval, quadratic in time: values at the start, the middle and the end, N m (N).
 ///
-/// Its mean is given by Simpson's rule. Laws that smear or shift a step of torque choose the three values such that the mean and the first moment, and with
-/// them the speed and the distance a mass gains, are exact however fast the law is.
+/// Its mean is given by Simpson's rule. Laws that smear or shift a step of torque choose the three values such that the mean and the first moment,
+/// and with them the speed and the distance a mass gains, are exact however fast the law is.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InputSegment<T> {
     /// Torque at the sample that begins the interval, N m (N).
@@ -23,8 +23,8 @@ impl<T: Real> InputSegment<T> {
         Self { start: tau, middle: tau, end: tau }
     }
 
-    /// Torque on a straight line with this mean, N m (N), and this first moment about the middle of an interval of `h` seconds: it gives a mass the speed and
-    /// the distance of any torque of equal mean and moment.
+    /// Torque on a straight line with this mean, N m (N), and this first moment about the middle of an interval of `h` seconds: it gives a mass the
+    /// speed and the distance of any torque of equal mean and moment.
     pub fn with_moment(mean: T, moment: T, h: T) -> Self {
         let rise = if h > T::zero() { lit::<T>(6.0) * moment / (h * h) } else { T::zero() };
         Self { start: mean - rise, middle: mean, end: mean + rise }

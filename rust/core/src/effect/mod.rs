@@ -172,16 +172,18 @@ impl Spec {
     };
 }
 
-/// How an effect is tested to first order before it is fitted.
+/// First-order test of an effect on the residual, before the effect is fitted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Trial {
-    /// By the derivatives by the first parameters, in this number, at the neutral value, at which these amplitudes vanish together.
+    /// Test by the derivatives of the predictions by the first parameters, which are amplitudes: at their neutral values together the effect
+    /// vanishes. The value is their number.
     Amplitudes(usize),
-    /// By the derivative at the neutral value along a ray on which all parameters grow together.
+    /// Test by the derivative of the predictions at the neutral value along a ray on which all parameters grow together.
     Ray,
-    /// Not at all: an external disturbance is looked for in each log by itself.
+    /// No test: an external disturbance is looked for in each log by itself.
     Disturbance,
-    /// By the whole difference that the effect makes at a trial value: a threshold has no derivative where it is never reached.
+    /// Test by the whole change of the predictions at a trial value, for an effect with a threshold: where the threshold is never reached, the
+    /// derivative is zero.
     Whole,
 }
 

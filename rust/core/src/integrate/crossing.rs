@@ -13,7 +13,7 @@ const MAX_REFINEMENTS: usize = 4;
 /// Largest number of false-position steps to the instant at which a stuck joint breaks away or a backlash opens.
 const MAX_FALSE_POSITIONS: usize = 12;
 
-/// Part of its change over a step below which a positive stiction violation, or flank tension, is near enough to its root.
+/// Positive stiction violation, or flank tension, as a part of the violation's change over a step, below which the root is near enough.
 const RELEASED: f64 = 1e-8;
 
 /// Distance by which a joint that has crossed a position at which its torque jumps is put beyond the position, rad or m.
@@ -70,7 +70,8 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A,
         first
     }
 
-    /// Event at which stuck joint `j` breaks away within the trial step, by linear interpolation of its friction torque at rest less the Coulomb level.
+    /// Event at which stuck joint `j` breaks away within the trial step, by linear interpolation of its friction torque at rest less the Coulomb
+    /// level.
     fn release(
         &self,
         j: usize,
@@ -153,7 +154,8 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A,
         state.modes[j] = Mode::Stuck;
     }
 
-    /// Integrates to where the velocity of an event's joint vanishes: Newton's method, its last correction so small that a straight line suffices.
+    /// Integrates to where the velocity of an event's joint vanishes, by Newton's method until the last correction is so small that linear
+    /// interpolation suffices.
     fn locate_standstill(&self, trial_step: &TrialStep<'_, T, N>, event: &ModeEvent<T>) -> Located<T, N> {
         let &TrialStep { state, x, dt, k1 } = trial_step;
         let mut s = event.s;
@@ -210,8 +212,8 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A,
         Located { length: s * dt, reached }
     }
 
-    /// Integrates to just beyond where static friction, or a closed flank, no longer holds: the Illinois variant of false position (Dowell and Jarratt 1971)
-    /// between the start of the step with the violation `ends[0] < 0` and its end with `ends[1] > 0`.
+    /// Integrates to just beyond where static friction, or a closed flank, no longer holds: the Illinois variant of false position (Dowell and
+    /// Jarratt 1971) between the start of the step with the violation `ends[0] < 0` and its end with `ends[1] > 0`.
     fn locate_beyond(
         &self,
         trial_step: &TrialStep<'_, T, N>,

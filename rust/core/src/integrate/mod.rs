@@ -21,7 +21,8 @@ use crate::transmission::LatentState;
 use crossing::{Located, TrialStep};
 use nalgebra::SVector;
 
-/// Largest number of events located within one step, after which crossing joints are stopped and the rest of the step is taken: 8 per joint, at least 16.
+/// Largest number of events located within one step, after which crossing joints are stopped and the rest of the step is taken: 8 per joint, at least
+/// 16.
 const fn max_events(joints: usize) -> usize {
     if joints < 2 { 16 } else { 8 * joints }
 }

@@ -3,10 +3,12 @@
 use crate::kinematics::JointState;
 use crate::real::{Real, lit};
 
-/// Newton correction, as a part of a step, below which a straight line in time suffices: its error is of the order of the square.
+/// Newton correction of the instant of zero velocity, as a part of a step, below which the motion up to that instant is taken as linear in time: the
+/// error is quadratic in the correction.
 pub(super) const STRAIGHT: f64 = 1e-6;
 
-/// Newton correction, as a part of a step, below which a curve of constant jerk suffices: its error is of the order of the cube.
+/// Newton correction of the instant of zero velocity, as a part of a step, below which the motion up to that instant is taken as of constant jerk:
+/// the error is cubic in the correction.
 const CURVED: f64 = 1e-3;
 
 /// Part of a step below which the jerk, from accelerations at both ends of the part, is not known well enough.
@@ -15,7 +17,8 @@ const SHORT: f64 = 0.01;
 /// Newton step, as a part of a step, at which the search for a root of the cubic through both ends stops: the motion is not exactly that cubic.
 const ROOT: f64 = 1e-3;
 
-/// Joint state close to where joint `j`'s velocity vanishes, `length` seconds after the start of a step, with accelerations at the start and at this state.
+/// Joint state close to where joint `j`'s velocity vanishes, `length` seconds after the start of a step, with accelerations at the start and at this
+/// state.
 pub(crate) struct VelocityZero<'a, T, const N: usize> {
     pub(crate) joints: &'a JointState<T, N>,
     pub(crate) j: usize,
@@ -30,8 +33,8 @@ impl<T: Real, const N: usize> VelocityZero<'_, T, N> {
         -self.joints.dq[self.j] / self.ddq[1][self.j]
     }
 
-    /// Time to zero velocity, s, and the joint state at zero velocity, if it is so close, in a step of `whole` seconds, that no further integration is
-    /// needed.
+    /// Time to zero velocity, s, and the joint state at zero velocity, if it is so close, in a step of `whole` seconds, that no further integration
+    /// is needed.
     #[inline]
     pub(crate) fn reached(&self, whole: T) -> Option<(T, JointState<T, N>)> {
         let correction = self.correction();
@@ -58,8 +61,8 @@ impl<T: Real, const N: usize> VelocityZero<'_, T, N> {
     }
 }
 
-/// First root in `(0, 1)` of the cubic with values `v0, v1` and slopes `d0, d1` at 0 and 1, where `v0 v1 <= 0` or the cubic leaves zero at 0; by bisection
-/// and Newton's method.
+/// First root in `(0, 1)` of the cubic with values `v0, v1` and slopes `d0, d1` at 0 and 1, where `v0 v1 <= 0` or the cubic leaves zero at 0; by
+/// bisection and Newton's method.
 #[inline]
 pub(crate) fn hermite_root<T: Real>(v0: T, d0: T, v1: T, d1: T) -> T {
     let (two, three) = (lit::<T>(2.0), lit::<T>(3.0));

@@ -32,8 +32,8 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A,
         motion
     }
 
-    /// Releases joint `j`, sticks joints that are then pulled back, and returns the accelerations; `in_vain` marks joints that are pulled back as they are
-    /// released.
+    /// Releases joint `j`, sticks joints that are then pulled back, and returns the accelerations; `in_vain` marks joints that are pulled back as
+    /// they are released.
     #[inline(never)]
     fn released(
         &self,
@@ -75,8 +75,8 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A,
         self.plant.friction_velocity(j, &state.dq, &state.latent) == T::zero()
     }
 
-    /// Released joint at rest whose acceleration is the first to change sign on a straight line between the accelerations `from` and `to`, with the fraction
-    /// of the line.
+    /// Released joint at rest whose acceleration is the first to change sign on a straight line between the accelerations `from` and `to`, with the
+    /// fraction of the line.
     #[inline]
     fn first_pulled_back(
         &self,
@@ -119,7 +119,8 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A,
         None
     }
 
-    /// Stuck joint, not marked `in_vain`, whose friction torque at rest exceeds its Coulomb level by most, and the friction mode that it breaks away to.
+    /// Stuck joint, not marked `in_vain`, whose friction torque at rest exceeds its Coulomb level by most, and the friction mode that it breaks away
+    /// to.
     #[inline]
     fn breaking_away(
         &self,
@@ -140,7 +141,8 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A,
         found
     }
 
-    /// Stiction violation of joint `j`, N m (N) (friction torque at rest less the Coulomb level), and the direction, -1 or 1, in which it would slide.
+    /// Stiction violation of joint `j`, N m (N) (friction torque at rest less the Coulomb level), and the direction, -1 or 1, in which it would
+    /// slide.
     #[inline]
     pub(super) fn stiction_violation(
         &self,

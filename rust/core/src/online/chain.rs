@@ -1,6 +1,6 @@
 //! Online estimators of serial arms, in three sizes of memory; the number of joints and of parameters is chosen at run time.
 //!
-//! An arm of fewer joints than the size has room for is continued by joints that stand still and carry no mass.
+//! An arm of fewer joints than the size has room for is extended by massless joints that stand still.
 
 use super::monitored::MonitoredEstimator;
 use super::{EstimatorSettings, OnlineError, check_start};
@@ -19,8 +19,8 @@ pub type MediumChain<T> = ChainEstimator<T, 4, 52, 40>;
 /// Online estimator of a serial arm of up to 7 joints and 72 parameters.
 pub type LargeChain<T> = ChainEstimator<T, 7, 91, 72>;
 
-/// Memory sizes of online estimators of serial arms. Each has room for the base parameters of any arm of `n` joints: `7 n - 4` of its links, `n - 1` rotor
-/// inertias, and viscous, Coulomb and constant torques.
+/// Memory sizes of online estimators of serial arms. Each has room for the base parameters of any arm of `n` joints: `7 n - 4` of its links, `n - 1`
+/// rotor inertias, and viscous, Coulomb and constant torques.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ChainSize {
     /// Up to 2 joints and 20 parameters: [`SmallChain`].
@@ -44,7 +44,7 @@ impl ChainSize {
         }
     }
 
-    /// Smallest size that has room for so many joints and estimated parameters; `None` if there is none.
+    /// Smallest size that has room for this number of joints and of estimated parameters; `None` if there is none.
     pub fn of(joints: usize, parameters: usize) -> Option<Self> {
         Self::ALL.into_iter().find(|size| joints <= size.room()[0] && parameters <= size.room()[1])
     }
@@ -59,8 +59,8 @@ pub struct ChainSettings<'a, T> {
     pub joints: &'a [ChainJoint<T>],
     /// Acceleration of gravity in the base frame, m/s^2.
     pub gravity: Vector3<T>,
-    /// Estimated parameters, strictly ascending, as indices into the arm's 13 parameters per joint ([`crate::chain::parameter`]); `13 n + j` is a constant
-    /// torque of joint `j`, `n` the number of joints.
+    /// Estimated parameters, strictly ascending, as indices into the arm's 13 parameters per joint ([`crate::chain::parameter`]); `13 n + j` is a
+    /// constant torque of joint `j`, `n` the number of joints.
     pub columns: &'a [usize],
     /// Known values of the 13 parameters per joint, SI, used for parameters that are not estimated; empty for zeros.
     pub known: &'a [T],

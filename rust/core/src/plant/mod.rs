@@ -109,7 +109,8 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         self
     }
 
-    /// Adds an effect; `None` beyond [`MAX_EFFECTS`], for a joint the arm does not have, or for a tilted base of an arm that does not move in one plane.
+    /// Adds an effect; `None` beyond [`MAX_EFFECTS`], for a joint the arm does not have, or for a tilted base of an arm that does not move in one
+    /// plane.
     pub fn with_effect(mut self, effect: Active<T>) -> Option<Self> {
         let tilt = effect.law.tilt(&effect.p);
         if tilt != T::zero() && !A::PLANAR {
@@ -404,8 +405,8 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         self.solve(inertia, &rhs, &held)
     }
 
-    /// Residual torque by inverse dynamics, N m (N): the torque that the measured motion `[q, dq, ddq]` needs beyond `tau`, with rigid transmissions and
-    /// friction smoothed as set.
+    /// Residual torque by inverse dynamics, N m (N): the torque that the measured motion `[q, dq, ddq]` needs beyond `tau`, with rigid transmissions
+    /// and friction smoothed as set.
     pub fn residual_torque(
         &self,
         t: T,
@@ -468,8 +469,8 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         core::array::from_fn(|j| !self.is_rounded(j) && modes[j] == Mode::Stuck)
     }
 
-    /// Stiction violation of joint `j` at rest, N m (N): friction torque at rest less the Coulomb level, positive where the joint breaks away; and the
-    /// direction, -1 or 1, in which the joint would slide.
+    /// Stiction violation of joint `j` at rest, N m (N): friction torque at rest less the Coulomb level, positive where the joint breaks away; and
+    /// the direction, -1 or 1, in which the joint would slide.
     #[inline]
     pub fn stiction_violation(&self, j: usize, t: T, q: T, tau: T, friction_at_rest: T) -> (T, T) {
         let direction = if friction_at_rest < T::zero() { -T::one() } else { T::one() };

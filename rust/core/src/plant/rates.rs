@@ -45,8 +45,8 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         })
     }
 
-    /// Fastest rate of the plant at the positions `q`, 1/s: at which smoothed friction stops a joint, a motor oscillates against its link, or a joint meets a
-    /// joint limit, as an impact that is to be resolved. Zero for a rigid arm with exact friction.
+    /// Fastest rate of the plant at the positions `q`, 1/s: at which smoothed friction stops a joint, a motor oscillates against its link, or a joint
+    /// meets a joint limit, as an impact that is to be resolved. Zero for a rigid arm with exact friction.
     pub fn fastest(&self, q: &SVector<T, N>) -> T {
         let behind = self.jumps && (0..N).any(|j| self.edges(j).any(|edge| edge.is_behind(q[j])));
         if !(0..N).any(|j| self.is_rounded(j)) && !self.drivetrain.any() && !behind {

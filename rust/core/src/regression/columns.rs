@@ -19,8 +19,8 @@ pub trait Columns<T: Real, const N: usize, const P: usize, const R: usize>: Copy
     /// Number of estimated parameters.
     fn count(&self) -> Self::Count;
 
-    /// Regressor rows over the estimated parameters, and outputs, from rows over the arm's first `inertial` parameters, friction, and outputs. With `M = N`
-    /// row `i` is that of joint `i`; with `M = 1` the row is a sum over joints.
+    /// Regressor rows over the estimated parameters, and outputs, from rows over the arm's first `inertial` parameters, friction, and outputs. With
+    /// `M = N` row `i` is that of joint `i`; with `M = 1` the row is a sum over joints.
     fn rows<const M: usize>(
         &self,
         whole: &SMatrix<T, M, P>,
@@ -90,8 +90,8 @@ pub struct ChosenColumns<T, const N: usize, const P: usize, const R: usize> {
 }
 
 impl<T: Real, const N: usize, const P: usize, const R: usize> ChosenColumns<T, N, P, R> {
-    /// Choice of parameters by strictly ascending indices, with the constant torque of joint `j` at `P + j`, and values of all others, SI. `None` if there
-    /// are too many or an index is not possible.
+    /// Choice of parameters by strictly ascending indices, with the constant torque of joint `j` at `P + j`, and values of all others, SI. `None` if
+    /// there are too many or an index is not possible.
     pub fn new(columns: impl IntoIterator<Item = usize>, known: &[T; P]) -> Option<Self> {
         const { assert!(R < NONE as usize && P < NONE as usize, "indices are bytes") }
         const { assert!(R.is_multiple_of(4), "whole lanes") }

@@ -78,8 +78,8 @@ pub struct Snapshot<T, const N: usize> {
 
 /// Interval from one state to the next in two parts, each under a constant torque.
 ///
-/// With states at the samples both parts have one torque; with states half-way between samples, where a difference of positions is the velocity to second
-/// order, the torque changes at the sample in the middle.
+/// With states at the samples both parts have one torque; with states half-way between samples, where a difference of positions is the velocity to
+/// second order, the torque changes at the sample in the middle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SampleInterval<T, const N: usize> {
     /// Duration of the interval, s.

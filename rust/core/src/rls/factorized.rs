@@ -70,8 +70,8 @@ impl<T: Real, const R: usize> Factorized<T, R> {
         sums
     }
 
-    /// Updates factors and estimate by rows of `Psi'` and their prediction errors; returns the leverage, or `None`, with nothing changed, if a row is of
-    /// impossible size.
+    /// Updates factors and estimate by rows of `Psi'` and their prediction errors; returns the leverage, or `None`, with nothing changed, if a row is
+    /// of impossible size.
     #[inline(always)]
     pub(super) fn learn<C: Cpu, N: Count, const M: usize>(
         &mut self,

@@ -42,9 +42,9 @@ pub(super) fn all_within<T: Real, const R: usize>(a: &[T; R], limit: T) -> bool 
     all
 }
 
-/// Number of parameters in use, at most as many as there is room for.
+/// Number of parameters in use, at most the number that the estimator has room for.
 pub trait Count: Copy + Debug + PartialEq {
-    /// Number of parameters in use where there is room for `room`.
+    /// Number of parameters in use in an estimator with room for `room` parameters.
     fn of(self, room: usize) -> usize;
 
     /// Calls `call(i)` for each of the first `n` entries of a column, and perhaps for entries after them, which are zero and stay zero.

@@ -25,8 +25,8 @@ pub use lanes::{All, Count, First};
 /// Form in which the covariance `P` of recursive least squares is kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Form {
-    /// Equation (21) of Reyes and Kelly (1997) as printed, rounded symmetrically. Positive definite as long as `psi' P psi` stays far below the reciprocal of
-    /// the rounding unit: in double precision for any arm, in single precision not.
+    /// Equation (21) of Reyes and Kelly (1997) as printed, rounded symmetrically. Positive definite as long as `psi' P psi` stays far below the
+    /// reciprocal of the rounding unit: in double precision for any arm, in single precision not.
     Plain,
     /// Factors `U D U'`: positive definite whatever the rounding.
     Factorized,
@@ -82,7 +82,8 @@ impl<T: Real, const R: usize> Rls<T, R> {
         Self::with_covariance(theta0, SMatrix::identity() * p0, forgetting)
     }
 
-    /// Start from the estimate `theta0`, SI, and a full positive definite `P(0)`, of which the upper triangle counts, with the forgetting factor in `(0, 1]`.
+    /// Start from the estimate `theta0`, SI, and a full positive definite `P(0)`, of which the upper triangle counts, with the forgetting factor in
+    /// `(0, 1]`.
     pub fn with_covariance(theta0: SVector<T, R>, p0: SMatrix<T, R, R>, forgetting: T) -> Self {
         let limit: [T; R] = p0.diagonal().into();
         Self {

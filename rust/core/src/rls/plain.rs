@@ -33,8 +33,8 @@ impl<T: Real, const R: usize> Plain<T, R> {
         self.diagonal
     }
 
-    /// Updates covariance and estimate by rows of `Psi'` and their prediction errors; returns the leverage, or `None`, with nothing changed, if `P` would not
-    /// stay positive definite.
+    /// Updates covariance and estimate by rows of `Psi'` and their prediction errors; returns the leverage, or `None`, with nothing changed, if `P`
+    /// would not stay positive definite.
     #[inline(always)]
     pub(super) fn learn<C: Cpu, N: Count, const M: usize>(
         &mut self,
@@ -134,7 +134,8 @@ impl<T: Real, const R: usize> Plain<T, R> {
         }
     }
 
-    /// Diagonal of `P` after the update, and whether it stays positive, which no rounding short of lost definiteness would change.
+    /// Diagonal of `P` after the update, and whether all of its entries stay positive; they do unless `P` is no longer positive definite up to
+    /// rounding.
     #[inline(always)]
     fn shrunk<C: Cpu, const M: usize>(
         &self,
@@ -154,7 +155,8 @@ impl<T: Real, const R: usize> Plain<T, R> {
         (diagonal, positive)
     }
 
-    /// Subtracts the sum of `gain gain' / total` from `P`. The product of two gains is equal for `(i, j)` and `(j, i)`, and need not wait for the reciprocal.
+    /// Subtracts the sum of `gain gain' / total` from `P`, with products of two gains first: they are equal for `(i, j)` and `(j, i)`, so `P` stays
+    /// symmetric, and do not depend on the reciprocal of `total`.
     #[inline(always)]
     fn take_off<C: Cpu, const M: usize>(&mut self, gain: &[[T; R]; M], inverse: &[T; M], r: usize) {
         for j in 0..r {

@@ -36,7 +36,8 @@ pub struct Run<'a, T: Real, A, const N: usize, const P: usize> {
     pub torque: &'a [[InputSegment<T>; N]],
     /// State at the first sample; after the rollout, the state at the end of the run.
     pub state: State<T, N>,
-    /// Joint positions, rad or m, at all samples after the first, `N` for each; unchanged after the run has left the limit. The rollout takes the slice.
+    /// Joint positions, rad or m, at all samples after the first, `N` for each; unchanged after the run has left the limit. The rollout takes the
+    /// slice.
     pub positions: &'a mut [T],
 }
 

@@ -29,8 +29,8 @@ const TRACE: f64 = 0.01;
 const TRACE_IN_SMALL: f64 = 0.1;
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// Hypotheses that are worth a full fit, each the fitted model with one more candidate, and the score tests of all candidates (open candidates
-    /// first; empty if none were made). `size` is the relative size of the gap.
+    /// Hypotheses that are worth a full fit, each the fitted model with one more candidate, and the score tests of all candidates (those not in the
+    /// model first; empty if no test was made). `size` is the relative size of the gap.
     pub(crate) fn initial_guesses(
         &self,
         fit: &Fit<P>,

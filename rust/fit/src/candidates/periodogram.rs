@@ -172,7 +172,8 @@ impl Kernel for Spectrum<'_> {
 }
 
 impl Spectrum<'_> {
-    /// Inner products, in one window, of the position responses to `sin(n q)` and `cos(n q)` without offset and drift, with each other and with the residual.
+    /// Inner products, in one window, of the position responses to `sin(n q)` and `cos(n q)` without offset and drift, with each other and with the
+    /// residual.
     #[inline(always)]
     fn products<C: Cpu>(&self, path: &Path) -> ([Each; 3], [Each; 2]) {
         let zero = [0.0; BATCH];

@@ -15,8 +15,8 @@ use rayon::prelude::*;
 /// Displacement of a candidate's tested parameter for its sensitivity, relative to its initial guess.
 const TRIAL: f64 = 1e-3;
 
-/// Beside other effects, one of this many initial guesses of a transmission is tried where encoder or friction is on the motor's side: latent states
-/// before a window then take as long to simulate as the window itself.
+/// One in this many initial guesses of a transmission is tried where encoder or friction is on the motor's side, in a search beside other effects:
+/// the latent states before a window take as long to simulate as the window itself.
 const MOTOR_GUESSES: usize = 3;
 
 /// Score test of a candidate at one initial guess.

@@ -1,4 +1,5 @@
-//! Output-error fit of a push: impulse, time and duration that minimise the prediction errors of the windows it touches.
+//! Output-error fit of a push (external disturbance): impulse, time and duration that minimise the prediction errors of the windows that the push
+//! touches.
 
 use super::own::Own;
 use super::push::{Disturbance, Place, PushState, SHORTEST};
@@ -16,24 +17,32 @@ const AROUND: f64 = 0.25;
 /// Longest duration of a fitted push, s.
 const LONGEST: f64 = 2.5;
 
-/// Least share of the windows' cost that a push must remove to be kept beside an unexplained remainder.
+/// Least share of the windows' cost that a push must remove to be kept where the model leaves errors unexplained.
 const HELPS: f64 = 0.01;
 
-/// Least share of the windows' cost, with the model refitted to the recording, that a push must remove to be kept beside an unexplained remainder;
-/// the model fitted to the recording with the push is compared to that fitted without it.
+/// Least share of the windows' cost, with the model refitted to the recording, that a push must remove to be kept where the model leaves errors
+/// unexplained; the model fitted to the recording with the push is compared with the model fitted without it.
 const HELPS_OWN: f64 = 0.02;
 
-/// Least share of the cost of the windows it touches that a push must explain before its size by output error is believed.
+/// Least share that a push must explain of the cost of the windows that it touches before its size by output error is believed.
 const EXPLAINS: f64 = 0.5;
 
-/// Largest shift of a push by output error, in its durations and at least in s, and largest factor by which its impulse may change.
+/// Largest shift of a push's time by the output-error fit, relative to the push's duration.
 const MOVED: f64 = 0.3;
+
+/// Shift of a push's time by the output-error fit that is always allowed, s.
 const MOVED_LEAST: f64 = 0.1;
+
+/// Largest factor by which the output-error fit may change the impulse of a push where the model leaves errors unexplained.
 const CHANGED: f64 = 1.5;
 
-/// Largest number of steps in the fit of a push, attempts at each step, and relative decrease of the cost that ends the fit.
+/// Largest number of Levenberg-Marquardt steps in the fit of a push.
 const ITERATIONS: usize = 12;
+
+/// Largest number of attempts at each step in the fit of a push, each with more damping.
 const ATTEMPTS: usize = 6;
+
+/// Relative decrease of the cost below which the fit of a push ends.
 const SETTLED: f64 = 1e-4;
 
 /// Durations, s, from which the fit of a push is started besides the duration seen in the residual torque.
@@ -56,7 +65,7 @@ struct Touched<'a, A, const N: usize, const P: usize> {
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// Whether the prediction errors of a log are large enough for a push of consequence; always true where the model leaves an unexplained remainder.
+    /// Whether the prediction errors of a log leave room for a push that matters; always true where the model leaves errors unexplained.
     pub(super) fn could_hold_a_push(&self, (set, track): Place, state: &PushState<'_, N, P>) -> bool {
         if state.remainder {
             return true;
@@ -76,10 +85,11 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         (weighting.with_zeros(state.zeros.clone()), predicted)
     }
 
-    /// The push `rough` with the impulse, time and duration fitted by output error, and the share of the cost it explains; `None` if it explains too little.
+    /// The push `rough` with the impulse, time and duration fitted by output error, and the share of the cost that the push explains; `None` if the
+    /// share is too small.
     ///
     /// The share counts from the cost of the model without the push, or of the model refitted to the recording alone if that is less. Where the model
-    /// leaves an unexplained remainder and the output error explains too little to be believed, `rough` is returned unchanged if it lowers the cost
+    /// leaves errors unexplained and the output error explains too little to be believed, `rough` is returned unchanged if the push lowers the cost
     /// under the model or under the refitted one. `known` are the recording's further pushes.
     pub(super) fn sized(
         &self,
@@ -138,13 +148,13 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     }
 }
 
-/// Least decrease of the windows' cost by a push of consequence.
+/// Least decrease of the windows' cost by a push that is large enough to matter.
 fn least_gain<const N: usize, const P: usize>(sample: &WindowSet<N>, state: &PushState<'_, N, P>) -> f64 {
     state.min_relevance.powi(2) * sample.motion(&state.scale)
 }
 
-/// Whether the fitted push (impulse, time, duration) agrees with the seen one in time and sign; beside an unexplained remainder also in size, for
-/// the fit may have taken up part of the remainder.
+/// Whether the fitted push (impulse, time, duration) agrees with the seen one in time and sign; where the model leaves errors unexplained
+/// (`remainder`) also in size, as the fit may have taken up part of these errors.
 fn close(fitted: &Vector3<f64>, seen: &Vector3<f64>, remainder: bool) -> bool {
     let ratio = fitted[0] / seen[0];
     let near = (fitted[1] - seen[1]).abs() < (MOVED * seen[2]).max(MOVED_LEAST);

@@ -6,8 +6,8 @@
 //! M(q) dde/dt2 = d,     y = e + v,     d white of intensity W = diag(w_1 .. w_n),     v white of the encoders' variances.
 //! ```
 //!
-//! The intensities maximise the likelihood (innovations of the Kalman filter; Schweppe 1965), with the initial state of every window unknown. Noise of
-//! the encoders and torque are told apart by their spectra, and the joint on which a torque acts from coupled joints by the inertia matrix.
+//! The intensities maximise the likelihood (innovations of the Kalman filter; Schweppe 1965), with the initial state of every window unknown. Noise
+//! of the encoders and torque are told apart by their spectra, and the joint on which a torque acts from coupled joints by the inertia matrix.
 
 use crate::likelihood::context::DiagnosisContext;
 use crate::likelihood::scale::Scales;

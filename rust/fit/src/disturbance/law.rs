@@ -78,7 +78,7 @@ struct Explanation<const N: usize, const P: usize> {
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// The effect that explains the logs as well as the pushes of a joint by the Bayesian information criterion, if there is one.
+    /// The effect that explains the logs no worse, by the Bayesian information criterion, than the pushes on a joint do; `None` if there is none.
     pub(super) fn law_in_place(
         &mut self,
         alone: &Attribution<N, P>,
@@ -129,8 +129,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         [1.0, -1.0].map(of_side).into_iter().filter(|trial| !trial.guesses.is_empty()).collect()
     }
 
-    /// The effect that replaces the pushes of a trial, and by how much it lowers the Bayesian information criterion; `None` if it does not lower it.
-    /// Pushes outside the trial are kept in both models.
+    /// The effect that replaces the pushes of a trial, and the decrease of the Bayesian information criterion; `None` if the criterion does not
+    /// decrease. Pushes outside the trial are kept in both models.
     fn law_of(&self, trial: &Trial, pushed: &Explanation<N, P>) -> Option<(f64, Cause)> {
         let all = self.of_all_windows();
         let model = &pushed.fit.hypothesis;
@@ -172,8 +172,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         self.on_windows(self.training.data.clone().and(self.holdout.data.clone()))
     }
 
-    /// The model refitted to the training windows, and its cost; initial states and weights are recomputed `rounds` times, at the scales and the typical
-    /// cost of the weighting `given`.
+    /// The model refitted to the training windows, and its cost; initial states and weights are recomputed `rounds` times, at the scales and the
+    /// typical cost of the weighting `given`.
     fn explanation(&self, fit: Fit<P>, given: &Weighting<N>, rounds: usize) -> Explanation<N, P> {
         let mut fit = fit;
         for _ in 0..rounds {

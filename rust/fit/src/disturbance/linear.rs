@@ -8,8 +8,10 @@ use crate::numeric::products::{cross, product};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-/// Correlation time of the residual torque, s, in the fit of model errors and in the test of pushes.
+/// Correlation time of the residual torque in the fit of model errors, s.
 const MODEL_TIME: f64 = 0.25;
+
+/// Correlation time of the residual torque in the test of pushes, s.
 const JUDGED_TIME: f64 = 0.06;
 
 /// Least scatter, relative to the joint's typical torque, in the weights of the fit of model errors: the torque of a joint that is hardly driven
@@ -19,8 +21,10 @@ const MODEL_SCATTER: f64 = 0.05;
 /// Least part of a Gaussian pulse that the further columns must leave unexplained for it to be told from them.
 const DISTINCT: f64 = 0.15;
 
-/// First guess of the residual's scatter relative to the joint's typical torque, and rounds of re-estimation of the scatter.
+/// First guess of the residual torque's scatter, relative to the joint's typical torque.
 const FIRST_SCATTER: f64 = 0.15;
+
+/// Rounds in which the scatter of the residual torque is estimated again.
 const ROUNDS: usize = 4;
 
 /// Prior standard deviation of a push's height relative to the typical torque of its joint.

@@ -18,15 +18,17 @@ use rayon::prelude::*;
 /// Cost of a window, relative to a typical window, from which a push is looked for in it.
 const OUTLYING: f64 = 30.0;
 
-/// Least share of the cost of the windows it touches that a push in an outlying window must explain.
+/// Least share that a push in an outlying window must explain of the cost of the windows that it touches.
 const CLEAR: f64 = 0.8;
 
-/// Least impulse of a push in an outlying window, in its standard deviations: an uncertain one has some further reason, such as the wrong instant at
-/// which a joint comes to rest.
+/// Least impulse of a push in an outlying window, in standard deviations of the impulse: the window of a less certain push is outlying for another
+/// reason, such as a wrong instant at which a joint comes to rest.
 const KNOWN: f64 = 5.0;
 
-/// Durations of pushes that are tried in an outlying window, s, and spacing of the times tried.
+/// Durations of pushes that are tried in an outlying window, s.
 const DURATIONS: [f64; 3] = [0.01, 0.05, 0.15];
+
+/// Spacing of the times at which pushes are tried in an outlying window, s.
 const STEP: f64 = 0.02;
 
 /// Impulse of a push, relative to its typical size, for derivatives by finite difference.

@@ -1,8 +1,8 @@
 //! External pushes: torques at one time of one log that are no part of the logged torque, judged within this log.
 //!
-//! `residual` is the residual torque of a log beside possible model errors; `search` finds pulses in it that occur once and do not depend on the state;
-//! `outlying` finds pushes too light for `search`; `fit` sizes a push by output error, where the model is good enough; `law` tells pushes from the
-//! action of a torque limit or a stop.
+//! `residual` is the residual torque of a log beside possible model errors; `search` finds pulses in it that occur once and do not depend on the
+//! state; `outlying` finds pushes too light for `search`; `fit` sizes a push by output error, where the model is good enough; `law` tells pushes from
+//! the action of a torque limit or a stop.
 
 use super::bell::Bell;
 use super::own::Own;
@@ -30,7 +30,7 @@ const FOLLOWS: f64 = 8.0;
 /// Part of a joint's travel next to either limit that counts as its end.
 const NEAR_END: f64 = 0.12;
 
-/// Probability left to a push where the model leaves an unexplained remainder.
+/// Largest probability of a push where the model leaves errors unexplained.
 const REMAINDER_DOUBT: f64 = 0.5;
 
 /// Ratio of prediction errors with and without pushes above which the pushes are rejected.
@@ -104,9 +104,9 @@ pub(super) type Place = (usize, usize);
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
     /// The conclusion of a diagnosis: the attribution `alone`, its external disturbances, and the attribution beside them.
     ///
-    /// Where the model describes the arm, pushes are looked for again under the model fitted beside them. Where it leaves an unexplained remainder, the
-    /// first pushes are kept: the second model then takes up part of the pushes. Pushes are rejected if prediction errors beside them are much
-    /// larger than without. An effect that replaces some pushes stays in the model beside the remaining pushes.
+    /// Where the model describes the arm, pushes are looked for again under the model fitted beside them. Where the model leaves errors unexplained,
+    /// the first pushes are kept, as the second model has taken up part of the pushes. Pushes are rejected if prediction errors with the model fitted
+    /// beside them are much larger than without. An effect that replaces some pushes stays in the model beside the remaining pushes.
     pub fn conclude(
         &mut self,
         mut alone: Attribution<N, P>,
@@ -205,7 +205,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         disturbances
     }
 
-    /// Whether a push and a further one on its joint both drive it back from one end of its travel, as contact with a stop does.
+    /// Whether a push and a further one on its joint both drive the joint back from one end of the joint's travel, as contact with a stop does.
     fn meets_an_end(&self, disturbance: &Disturbance, bells: &[Bell]) -> bool {
         let joint = disturbance.push.joint;
         let [from, to] = self.scales.travel[joint];

@@ -1,7 +1,7 @@
 //! Low-passed residual torque of a whole log under a model, and columns of torques by which the model could be wrong.
 //!
-//! The residual torque is the torque that the measured motion needs minus the logged one. It and every column go through one low-pass, so that neither
-//! a lag nor noise of the acceleration enters only one of them. A push is a part of the residual torque that no combination of the columns
+//! The residual torque is the torque that the measured motion needs minus the logged one. It and every column go through one low-pass, so that
+//! neither a lag nor noise of the acceleration enters only one of them. A push is a part of the residual torque that no combination of the columns
 //! explains: it does not recur with the state.
 
 use crate::likelihood::solve::Prior;
@@ -17,8 +17,10 @@ use nalgebra::{SMatrix, SVector};
 /// Standard deviation of the Gaussian low-pass of residual torques, s: elastic vibrations and delays are faster, a push by hand slower.
 pub const LOW_PASS: f64 = 0.045;
 
-/// Spacing of the grid of the residual torque, s, and least spacing in sample periods.
+/// Spacing of the grid of times of the residual torque, s.
 const GRID: f64 = 0.01;
+
+/// Least spacing of the grid of times of the residual torque, in sample periods.
 const GRID_SAMPLES: f64 = 2.0;
 
 /// Ratio of the largest friction of a joint at rest to its Coulomb friction: static friction exceeds sliding friction.
@@ -27,12 +29,16 @@ const STATIC: f64 = 1.1;
 /// Prior standard deviation of torques of unknown effects, relative to the joint's typical torque.
 const UNKNOWN: f64 = 0.05;
 
-/// Prior standard deviation of a missing rotor's inertia, and of its coupling, relative to the joint's own inertia.
+/// Prior standard deviation of a missing rotor's inertia, relative to the joint's own inertia.
 const ROTOR: f64 = 0.1;
+
+/// Prior standard deviation of a missing rotor's inertial coupling to another joint, relative to the smaller of both joints' inertias.
 const COUPLING: f64 = 0.05;
 
-/// Prior standard deviation of an encoder's zero error, rad, and the displacement for its torque by finite difference.
+/// Prior standard deviation of an encoder's zero error, rad.
 const ZERO: f64 = 0.05;
+
+/// Displacement of a position in the finite difference of the torque by an encoder's zero, rad.
 const TURN: f64 = 1e-3;
 
 /// Prior standard deviation of a lag of the torque, s.

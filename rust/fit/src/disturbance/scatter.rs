@@ -12,8 +12,10 @@ const FREEDOM: f64 = 5.0;
 /// Multiplicative updates of the coefficients of activity.
 const UPDATES: usize = 60;
 
-/// Smallest and largest standard deviation of the residual torque by activity, relative to the typical one.
+/// Smallest standard deviation of the residual torque that the activity of the motion may give, relative to the typical one.
 const QUIET: f64 = 0.5;
+
+/// Largest standard deviation of the residual torque that the activity of the motion may give, relative to the typical one.
 const VIOLENT: f64 = 8.0;
 
 /// Half width of the stretch of a local median, s.

@@ -1,9 +1,9 @@
 //! Pushes in the residual torque of one log: Gaussian pulses that stand out beside all possible model errors.
 //!
 //! Parameters, unknown effects and pulses are fitted together, linearly; the gain of a pulse at one time, of one width, on one joint is compared with
-//! the scatter around it and reduced by the part that other columns could imitate (generalised likelihood ratio). The largest pulses are added one
-//! by one, for one push hides another by raising the scatter; doubtful pulses are then removed, and beside an unexplained remainder also those that
-//! stand out only while they are fitted.
+//! the scatter around the pulse and reduced by the part that other columns could imitate (generalised likelihood ratio). The largest pulses are added
+//! one by one, as one push hides another by raising the scatter. Doubtful pulses are then removed, and, where the model leaves errors unexplained,
+//! also pulses that stand out only while they are fitted.
 
 use super::bell::{Bell, all_but};
 use super::linear::{Fitted, Linear};
@@ -14,23 +14,32 @@ use rayon::prelude::*;
 /// Standard deviations of the Gaussian pulses looked for, after the low-pass, s.
 const WIDTHS: [f64; 7] = [0.045, 0.055, 0.07, 0.09, 0.115, 0.145, 0.18];
 
-/// Spacing of the times of pulses tried, s, in the coarse and in the fine search, and half range of the fine search.
+/// Spacing of the times of pulses tried in the coarse search, s.
 const COARSE: f64 = 0.02;
+
+/// Spacing of the times of pulses tried in the fine search, s.
 const FINE: f64 = 0.01;
+
+/// Half range of times of the fine search around a pulse, s.
 const REFINED: f64 = 0.08;
 
-/// Size of a pulse, in standard deviations, from which it is tried, from which it is a push on an arm that the model describes, on one that it does
-/// not describe if the pulse exceeds the joint's friction, and on any arm.
+/// Size, in standard deviations, from which a pulse is tried as a push.
 const TRIED: f64 = 2.5;
+
+/// Size, in standard deviations, from which a pulse is a push where the model describes the arm.
 const LIKELY: f64 = 5.0;
+
+/// Size, in standard deviations, from which a pulse is a push where the model leaves errors unexplained and the pulse exceeds the joint's friction.
 const ABOVE_REMAINDER: f64 = 3.9;
+
+/// Size, in standard deviations, from which a pulse is a push where the model leaves errors unexplained, whatever the joint's friction.
 const CERTAIN: f64 = 12.0;
 
-/// Size of a pulse, in standard deviations, that the largest pulse of a log must have while it still counts as scatter. A log without one holds
-/// no push, not even pushes that hide each other.
+/// Size, in standard deviations, that the largest pulse of a log must have for pushes to be looked for, while the scatter still contains all pulses.
+/// In a log without such a pulse there is no push, and there are no pushes that hide each other.
 const STANDS_OUT: f64 = 3.6;
 
-/// Least height of a push beside an unexplained remainder, relative to the joint's friction at rest.
+/// Least height of a push relative to the joint's friction at rest, where the model leaves errors unexplained.
 const ABOVE_FRICTION: f64 = 1.2;
 
 /// Largest number of pushes looked for in one log; as many are no rare events.
@@ -110,8 +119,8 @@ impl<const N: usize> Search<'_, N> {
         Some(())
     }
 
-    /// Removes pulses that stand out only while they are fitted, the weakest first: beside an unexplained remainder a pulse takes up model errors
-    /// around it and so appears in a calm stretch.
+    /// Removes pulses that stand out only while they are fitted, the weakest first: where the model leaves errors unexplained, a pulse takes up
+    /// errors around it, lowers the scatter there and so appears to stand out.
     fn drop_aided(&mut self, found: &mut Found) -> Option<()> {
         while !found.bells.is_empty() {
             let bells = &found.bells;

@@ -1,8 +1,9 @@
 //! The arm's parameters re-estimated without any effect, under the arm file's standard deviations as prior.
 //!
-//! The plausibility checks of the input compare a log as it stands with the log after correction of a defect. Scales follow the residual, so the cost
-//! has several minima: far from the logs the residual is large, the prior holds the parameters, and the residual stays large. An arm with an unknown
-//! load, or with a wrong arm file, is found from parameters estimated from the logs.
+//! The plausibility checks of the input compare a log as it stands with the log after correction of a defect. The scale of the residual is estimated
+//! with the parameters, so the cost has several minima: far from the logs the residual is large, the prior outweighs it, and the parameters stay
+//! where they are. So the fit also starts from parameters that a linear regression finds, as an arm with an unknown load or a wrong arm file
+//! requires.
 
 use crate::diagnose::Request;
 use crate::likelihood::context::WindowSet;

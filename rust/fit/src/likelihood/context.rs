@@ -10,7 +10,7 @@ use crate::progress::{Phase, ProgressReporter};
 use armgap_core::arm::Arm;
 use armgap_core::transmission::Sides;
 
-/// Largest number of rounds in which a fit and the weights of its residuals are recomputed by turns.
+/// Largest number of rounds in which, alternately, a model is fitted and the weights of its residuals are computed.
 const MAX_ROUNDS: usize = 5;
 
 /// Ratio of successive residual scales of every joint below which re-weighting ends.
@@ -197,8 +197,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         weighting.robust(&sample.data, &residual).with_zeros(zeros.clone())
     }
 
-    /// Weighting around encoder zeros and initial states fitted to the hypothesis once, starting from `zeros`; `fitted` estimates zeros from the inner products
-    /// of their columns.
+    /// Weighting around encoder zeros and initial states fitted to the hypothesis once, starting from `zeros`; `fitted` estimates zeros from the
+    /// inner products of their columns.
     fn fitting_zeros(
         &self,
         sample: &WindowSet<N>,
@@ -229,7 +229,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         FittedZeros { zeros, offsets }
     }
 
-    /// Weighting around predictions from initial states with these offsets, their residual, and their derivatives by initial positions and velocities.
+    /// Weighting around predictions from initial states with these offsets, their residual, and their derivatives by initial positions and
+    /// velocities.
     fn linearised(
         &self,
         sample: &WindowSet<N>,
@@ -246,12 +247,13 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         (weighting, residual, sensitivities)
     }
 
-    /// Fits with residual scales re-estimated by turns, from `scale` down to the residual's own, with encoder zeros that differ between recordings.
+    /// Fits the model and re-estimates the residual scales alternately, from `scale` down to the residual's own, with encoder zeros that differ
+    /// between recordings.
     pub fn settle(&self, start: &Hypothesis<P>, scale: [f64; N]) -> (Fit<P>, SplitWeighting<N>) {
         self.settled(start, scale, EncoderZeros::can_be_told_from(&self.training.data))
     }
 
-    /// Fits with residual scales re-estimated by turns, with encoder zeros equal to the model's in every recording.
+    /// Fits the model and re-estimates the residual scales alternately, with the model's encoder zeros in every recording.
     pub(crate) fn settle_without_zeros(
         &self,
         start: &Hypothesis<P>,
@@ -288,8 +290,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         (fit, weights)
     }
 
-    /// Cost of the training windows once parameters are estimated together with encoder zeros that differ between recordings, in the scales and with the typical
-    /// window of a weighting without such zeros.
+    /// Student-t cost of the training windows after parameters and encoder zeros of the recordings are estimated together, with the scales and the
+    /// typical window cost of `weighting`, which has no such zeros.
     pub(crate) fn cost_with_zeros(&self, fit: &Fit<P>, weighting: &Weighting<N>) -> f64 {
         let mut beside = weighting.clone();
         let mut hypothesis = fit.hypothesis.clone();
@@ -343,7 +345,8 @@ fn loop_rounds(mut round: impl FnMut(usize) -> bool) {
     }
 }
 
-/// Offsets of initial states limited to twenty standard deviations of the measured state; beyond, the model of the window is at fault.
+/// Offsets of initial states limited to twenty standard deviations of the measured state; a larger offset would mean that the model is wrong in the
+/// window.
 fn bounded<const N: usize>(
     data: &Dataset<N>,
     offsets: Vec<InitialStateOffset<N>>,

@@ -1,10 +1,10 @@
 //! Encoder zeros of recordings: nuisance parameters of the fit.
 //!
-//! An incremental encoder finds its zero anew at every start of a robot, with a random error. The error shared by all recordings is a question about the
-//! arm (an encoder offset, a tilted base) and is left to the candidates. Differences between recordings are random effects with mean zero and one standard
-//! deviation per joint, estimated from the training recordings by expectation maximisation with the uncertainty of the shared part (restricted
-//! maximum likelihood; Laird and Ware 1982, Biometrics 38, section 4);
-//! a recording's zero is its posterior mean. Where recordings do not differ, the standard deviation and the zeros go to zero.
+//! An incremental encoder finds its zero anew at every start of a robot, with a random error. The error shared by all recordings is a question about
+//! the arm (an encoder offset, a tilted base) and is left to the candidates. Differences between recordings are random effects with mean zero and one
+//! standard deviation per joint, estimated from the training recordings by expectation maximisation with the uncertainty of the shared part
+//! (restricted maximum likelihood; Laird and Ware 1982, Biometrics 38, section 4); a recording's zero is its posterior mean. Where recordings do not
+//! differ, the standard deviation and the zeros go to zero.
 
 use crate::likelihood::solve::inverse_of_seen;
 use crate::likelihood::weighting::Gram;
@@ -18,8 +18,8 @@ const LARGEST_SPREAD: f64 = 0.1;
 /// Rounds of expectation maximisation: tens settle a non-zero standard deviation of the zeros, hundreds bring a vanishing one down to zero.
 const ROUNDS: usize = 300;
 
-/// Prior odds that encoders whose zeros scatter have an offset besides. At 1, the mean of three or four recordings' zeros is named as an offset at 0.67 and
-/// 0.75 on arms without one; at 0.01 an offset of four times the scatter of three recordings is doubtful.
+/// Prior odds that encoders whose zeros scatter have an offset besides. At 1, the mean of three or four recordings' zeros is named as an offset at
+/// 0.67 and 0.75 on arms without one; at 0.01 an offset of four times the scatter of three recordings is doubtful.
 const SHARED: f64 = 0.1;
 
 /// Encoder zeros of recordings, and the normal distribution that they were drawn from.
@@ -76,7 +76,7 @@ impl<const N: usize> EncoderZeros<N> {
         data.tracks.iter().any(|track| track.source != data.tracks[0].source)
     }
 
-    /// Whether the zeros of all recordings of a dataset are among these.
+    /// Whether the zeros of all recordings of a dataset are known.
     pub fn knows_all(&self, data: &Dataset<N>) -> bool {
         data.tracks.iter().all(|track| self.recordings.iter().any(|r| r.source == track.source))
     }
@@ -113,7 +113,7 @@ impl<const N: usize> EncoderZeros<N> {
         found
     }
 
-    /// These encoder zeros, and the zeros of the dataset's further recordings by the distribution of these.
+    /// The known encoder zeros, and estimates of the zeros of the dataset's further recordings, with the known zeros' distribution as prior.
     pub(crate) fn and_of_others(&self, data: &Dataset<N>, gram: &Gram, known: usize) -> Self {
         let mut found = self.clone();
         found.recordings.truncate(known);
@@ -127,8 +127,8 @@ impl<const N: usize> EncoderZeros<N> {
         found
     }
 
-    /// Odds that the recordings' zeros of joint `j` have a mean, `shared` beside these zeros, rather than mean zero: `SHARED` times the likelihood ratio by the
-    /// Bayesian information criterion of a normal sample (Schwarz 1978; Student's t test). `None` where recordings do not differ.
+    /// Odds that the recordings' zeros of joint `j` have a mean, `shared` beside these zeros, rather than mean zero: `SHARED` times the likelihood
+    /// ratio by the Bayesian information criterion of a normal sample (Schwarz 1978; Student's t test). `None` where recordings do not differ.
     pub fn odds_of_shared(&self, j: usize, shared: f64) -> Option<f64> {
         let n = self.recordings.len() as f64;
         if n < 2.0 || self.spread[j] <= 0.0 {
@@ -182,8 +182,8 @@ impl<const N: usize> EncoderZeros<N> {
         RecordingZero { source: evidence.source.clone(), zero, sigma }
     }
 
-    /// Mean of the encoder zeros over all recordings and its covariance, by generalised least squares: weights are inverse to the scatter between recordings
-    /// plus each recording's own covariance.
+    /// Mean of the encoder zeros over all recordings and its covariance, by generalised least squares: weights are inverse to the scatter between
+    /// recordings plus each recording's own covariance.
     fn shared(&self, evidence: &[Evidence<N>], has_mean: [bool; N]) -> (SVector<f64, N>, SMatrix<f64, N, N>) {
         let mut normal = DMatrix::<f64>::zeros(N, N);
         let mut right = DVector::<f64>::zeros(N);

@@ -28,7 +28,7 @@ pub struct Scales<const N: usize> {
     pub gravity: f64,
 }
 
-/// Largest value of a parameter in a fit relative to its typical size; beyond, it describes no arm.
+/// Largest value of a parameter in a fit relative to its typical size; larger values are those of no arm.
 const LARGEST: f64 = 50.0;
 
 /// Longest admissible time constant of an effect, in sample periods.
@@ -40,9 +40,13 @@ const HARDEST: f64 = 1e4;
 /// Largest characteristic speed of a speed-dependent effect, relative to the joint's RMS speed; beyond, it resembles another effect.
 const FASTEST: f64 = 2.5;
 
-/// Natural frequency, 1/s, damping ratio, and the motor's share of the joint's inertia, of a typical elastic joint.
+/// Natural frequency of a typical elastic joint, 1/s.
 const SHAFT_RATE: f64 = 100.0;
+
+/// Damping ratio of a typical elastic joint.
 const SHAFT_DAMPING: f64 = 0.2;
+
+/// Motor's share of the joint's inertia in a typical elastic joint.
 const MOTOR_SHARE: f64 = 0.1;
 
 impl<const N: usize> Scales<N> {

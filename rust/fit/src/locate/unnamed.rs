@@ -1,11 +1,11 @@
 //! Dependences of the residual torque that no effect explains: tables over one variable of the motion.
 //!
-//! For every joint the residual torque by inverse dynamics is regressed on one variable of the motion at a time, as a table over classes of equal count
-//! (the regressogram of Tukey 1961), beside the arm's own parameters: missing torques have shifted them, and the residual torque of a fitted model is what
-//! they leave. Residual torque, regressor and classes go through one low-pass, so that neither noise of the acceleration nor a lag enters only one of them.
-//! Tables are added one after another (forward selection). A table counts if it predicts logs that it was not fitted to: each log in turn is left
-//! out, and its residual under the table of the remaining logs is compared with its residual under the parameters alone. The scatter of the gain over blocks of
-//! one second says whether chance would do as well.
+//! For every joint the residual torque by inverse dynamics is regressed on one variable of the motion at a time, as a table over classes of equal
+//! count (the regressogram of Tukey 1961), beside the arm's own parameters: missing torques have shifted them, and the residual torque of a fitted
+//! model is what they leave. Residual torque, regressor and classes go through one low-pass, so that neither noise of the acceleration nor a lag
+//! enters only one of them. Tables are added one after another (forward selection). A table counts if it predicts logs that it was not fitted to:
+//! each log in turn is left out, and its residual under the table of the remaining logs is compared with its residual under the parameters alone. The
+//! scatter of the gain over blocks of one second says whether chance would do as well.
 
 use crate::locate::dependence::{Dependence, DependenceLaw, MotionVariable};
 use crate::locate::variable_classes::{CLASSES, Classes};

@@ -15,7 +15,8 @@ pub struct Classes {
     pub variable: MotionVariable,
     /// Mean of the variable in each class, in its SI unit; `None` for an empty class.
     pub mean: [Option<f64>; CLASSES],
-    /// Share of the weights of the residual torque's low-pass filter, around each sample that is kept, that lies on samples of each class of the variable.
+    /// Share of the weights of the residual torque's low-pass filter, around each sample that is kept, that lies on samples of each class of the
+    /// variable.
     pub share: Vec<[f64; CLASSES]>,
 }
 

@@ -6,11 +6,13 @@
 
 use crate::log::track::{Smoothed, Track, median};
 
-/// Largest shift of a window's edge, relative to the window's length. With 0.4 floors hardly fall further and windows differ by more than a factor of two.
+/// Largest shift of a window's edge, relative to the window's length. With 0.4 floors hardly fall further and windows differ by more than a factor of
+/// two.
 const REACH: f64 = 0.2;
 
-/// Squared error of a velocity that is measured at a reversal, in units of the variance of a typical one: errors of some ten standard deviations
-/// were seen. It only has to exceed the differences of variances within reach; other values were not tried.
+/// Squared error of a velocity that is measured at a reversal, in units of the variance of a typical one: errors of some ten standard deviations were
+/// seen. The value only has to exceed the differences between the variances of samples to which a window's edge may be shifted; other values were not
+/// tried.
 const REVERSAL: f64 = 100.0;
 
 /// Index pairs `(first, last)` of consecutive windows of about `horizon` seconds, each edge shifted to the nearby sample with the smallest error of

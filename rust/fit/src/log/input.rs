@@ -36,8 +36,8 @@ pub struct Options {
     /// Half width of the test functions of a serial arm's equation of motion, s; `None` for the default. Logs that were low-passed before they were
     /// written require a half width larger than that filter's.
     pub half_width: Option<f64>,
-    /// Whether the unit of a serial arm's torques is known independently. Where it was inferred from the arm file's masses, logs cannot show that a mass
-    /// is wrong too: loads, wrong links and gains are no candidates.
+    /// Whether the unit of a serial arm's torques is known independently. Where it was inferred from the arm file's masses, logs cannot show that a
+    /// mass is wrong too: loads, wrong links and gains are no candidates.
     pub known_units: bool,
     /// Joints, from 0, of the custom effects, whose torques lie in the logs' tables.
     pub custom_effects: Vec<usize>,

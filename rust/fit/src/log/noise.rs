@@ -16,8 +16,8 @@ const TAKEN: usize = 7;
 /// Strides, in rows, between the samples of a divided difference; held positions are held over 2 to 6 rows.
 const STRIDES: [usize; 6] = [1, 2, 3, 4, 5, 6];
 
-/// Ratio to the noise of successive samples below which another series of samples shows clearly less: six estimates of one noise, each from a
-/// few hundred places, scatter by less.
+/// Ratio of two noise estimates, another series of samples over successive samples, below which the former is clearly smaller: six estimates of one
+/// noise, each from a few hundred places, differ by less.
 const CLEARLY: f64 = 0.75;
 
 /// Largest number of samples of a log around which its noise is estimated: the estimate is then good to three percent.

@@ -15,9 +15,10 @@ const HALF_WIDTHS: [usize; 8] = [3, 4, 6, 8, 11, 15, 20, 27];
 /// Half width, in standard deviations, of the confidence intervals that successive widths of a local cubic must share.
 const CONFIDENCE: f64 = 2.0;
 
-/// Smallest and largest mean square error of a measured state, in units of its variance: an estimate from one window is no better
-/// known, and above the largest the positions are not those of the arm.
+/// Smallest mean square error of a measured state, in units of its variance: an estimate from one window is no better known.
 const LEAST_ERROR: f64 = 0.25;
+
+/// Largest mean square error of a measured state, in units of its variance: above, the positions are not those of the arm.
 const LARGEST_ERROR: f64 = 10.0;
 
 /// Number of samples of the widest local cubic.

@@ -13,7 +13,8 @@ use armgap_core::transmission::{LatentState, Sides, Transmission};
 /// Largest product of a motor's natural frequency, rad/s, and step length in the simulation of latent states.
 const STEP: f64 = 1.0;
 
-/// Largest product of natural frequency, rad/s, and step length where measured states are inserted at every sample, so that steps need only be stable.
+/// Largest product of natural frequency, rad/s, and step length where measured states are inserted at every sample, so that steps need only be
+/// stable.
 const STABLE: f64 = 1.5;
 
 /// Time constant with which a link behind its motor's encoder is drawn to the deflection by the motor's torque balance, s: long beside a sample, as

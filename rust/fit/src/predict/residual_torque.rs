@@ -8,12 +8,16 @@ use armgap_core::arm::Arm;
 use armgap_core::transmission::LatentState;
 use nalgebra::SVector;
 
-/// Half width of the local cubic from which accelerations are taken, s, and its least half width in samples.
+/// Half width of the local cubic from which accelerations are taken, s.
 const CUBIC: f64 = 0.014;
+
+/// Least half width, in samples, of the local cubic from which accelerations are taken.
 const CUBIC_SAMPLES: usize = 3;
 
-/// Ratio to a joint's RMS speed, and to the noise of its velocity, below which the joint may be at rest; the larger speed counts.
+/// Speed below which a joint may be at rest, relative to the joint's RMS speed; the larger of this speed and that of `SLOW_NOISE` counts.
 pub const SLOW: f64 = 0.05;
+
+/// Speed below which a joint may be at rest, relative to the standard deviation of its measured velocity.
 const SLOW_NOISE: f64 = 4.0;
 
 /// Residual torque of all joints at one sample, with the measured motion.
@@ -28,8 +32,8 @@ pub struct InverseDynamicsResidual<const N: usize> {
     pub residual: SVector<f64, N>,
 }
 
-/// Residual torques of a log at all samples except `half` at either end, with derivatives from local cubics of that half width, friction regularised below
-/// the speed `slow`, rad/s or m/s, and the disturbances `pushes` acting; `None` if the model cannot be simulated.
+/// Residual torques of a log at all samples except `half` at either end, with derivatives from local cubics of that half width, friction regularised
+/// below the speed `slow`, rad/s or m/s, and the disturbances `pushes` acting; `None` if the model cannot be simulated.
 pub fn inverse_dynamics_residuals<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     arm: &A,
     track: &Track<N>,

@@ -142,8 +142,8 @@ fn residual_torques<A: Arm<f64, N, P>, const N: usize, const P: usize>(
 
 /// Share of each joint in the gap: what causes explain lies on their joints, weighted by their probability; the rest is shared by residual torque.
 ///
-/// A residual torque on one joint changes the motion of all, and an error of its coupling shows on the others; so where a cause is known, its own joint says more
-/// than the residual torque does.
+/// A residual torque on one joint changes the motion of all, and an error of its coupling shows on the others; so where a cause is known, its own
+/// joint says more than the residual torque does.
 fn joint_shares<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     context: &DiagnosisContext<A, N, P>,
     Headline { attribution, weights, causes, disturbances, .. }: &Headline<N, P>,
@@ -370,7 +370,7 @@ fn noise<A, const N: usize, const P: usize>(context: &DiagnosisContext<A, N, P>)
     Noise { position_sigma: context.noise.to_vec(), encoder_step: step.to_vec() }
 }
 
-/// Remarks on the result: what was fitted beside the causes, what gap is left, what was not allowed, and what is hard to believe.
+/// Remarks on the result: nuisances fitted beside the causes, the remaining gap, limits set by the options, and implausible values.
 fn notes<const N: usize, const P: usize>(
     headline: &Headline<N, P>,
     max_causes: usize,

@@ -9,25 +9,26 @@ use crate::numeric::random::Random;
 use crate::predict::window::{Dataset, InitialStateOffset, Window};
 use armgap_core::arm::Arm;
 
-/// Displaced initial states from which the errors of a perfect model are estimated: six give the mean square of one window to some 40 %, that of forty windows to
-/// 6 %.
+/// Displaced initial states from which the errors of a perfect model are estimated: six give the mean square of one window to some 40 %, that of
+/// forty windows to 6 %.
 const DISPLACED: usize = 6;
 
-/// Cost per sample and joint up to which a window is consistent with its noise and its measured initial state: the noise is known to 3 %, and of some hundred
-/// values the mean square scatters by 15 %.
+/// Cost per sample and joint up to which a window is consistent with its noise and its measured initial state: the noise is known to 3 %, and of some
+/// hundred values the mean square scatters by 15 %.
 const CONSISTENT: f64 = 1.5;
 
-/// A displaced initial state explains a window if the squares that it leaves beyond noise, with two standard deviations of them, times this factor are below the
-/// squared errors. A missing torque that is constant over the window leaves 1/36 of the squared errors it makes once the initial state is fitted, any other more;
-/// such a torque may make a quarter of the squared errors at most.
+/// A displaced initial state explains a window if the squares that it leaves beyond noise, with two standard deviations of them, times this factor
+/// are below the squared errors. A missing torque that is constant over the window leaves 1/36 of the squared errors it makes once the initial state
+/// is fitted, any other more; such a torque may make a quarter of the squared errors at most.
 const TORQUE_SHARE: f64 = 4.0 * 36.0;
 
-/// Share of the windows that displaced initial states have to explain before any window counts as explained: where most are not explained, those that seem to be
-/// are the ones in which the model errs least, and their errors are not errors of initial states. With 0.7 as many of 42 floors are right, with 0.9 one fewer.
+/// Share of the windows that displaced initial states have to explain before any window counts as explained: where most are not explained, those that
+/// seem to be are the ones in which the model errs least, and their errors are not errors of initial states. With 0.7 as many of 42 floors are right,
+/// with 0.9 one fewer.
 const MAJORITY: f64 = 0.5;
 
-/// Mean square position error of a perfect model by joint, rad^2 or m^2: noise of the samples, and errors of the measured initial states carried along the
-/// windows.
+/// Mean square position error of a perfect model by joint, rad^2 or m^2: noise of the samples, and errors of the measured initial states carried
+/// along the windows.
 pub(crate) fn floor<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     context: &DiagnosisContext<A, N, P>,
     data: &Dataset<N>,
@@ -55,19 +56,20 @@ pub(crate) fn floor<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     })
 }
 
-/// Whether noise and a displaced initial state explain a model's error in a window of `values` values: the displacement is within the covariance of the measured
-/// state (`cost`), or leaves so little of the squared errors (`left` of `square`, in units of the noise) that no torque can have made them.
+/// Whether noise and a displaced initial state explain a model's error in a window of `values` values: the displacement is within the covariance of
+/// the measured state (`cost`), or leaves so little of the squared errors (`left` of `square`, in units of the noise) that no torque can have made
+/// them.
 fn explained(values: usize, square: f64, cost: f64, left: f64) -> bool {
     let values = values as f64;
     let beyond_noise = left - values + 2.0 * (2.0 * values).sqrt();
     cost < CONSISTENT * values || TORQUE_SHARE * beyond_noise < square
 }
 
-/// Mean square error of a perfect model from the mean squares by window that a model missed by (`missed`) and that noise and the covariance of initial states make
-/// one expect (`expected`).
+/// Mean square error of a perfect model, from the mean square error of a model by window (`missed`) and the mean square error by window that noise
+/// and the covariance of initial states predict (`expected`).
 ///
-/// In an explained window a perfect model errs as the model does. In any other window it errs by what is expected, times the ratio of missed to expected in
-/// explained windows, and by no more than the model. Where most windows are not explained, none counts as explained.
+/// In an explained window a perfect model errs as the model does. In any other window it errs by what is expected, times the ratio of missed to
+/// expected in explained windows, and by no more than the model. Where most windows are not explained, none counts as explained.
 fn perfect_error(missed: &[f64], expected: &[f64], explained: &[bool]) -> f64 {
     let count = explained.iter().filter(|e| **e).count() as f64;
     let most = count >= MAJORITY * explained.len() as f64;

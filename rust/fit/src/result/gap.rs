@@ -70,7 +70,8 @@ impl<const N: usize> Errors<N> {
         }
     }
 
-    /// RMS error per joint, rad or m, of the model with causes and the encoder zeros fitted to the holdout's recordings, so that their scatter does not count.
+    /// RMS error per joint, rad or m, of the model with causes and the encoder zeros fitted to the holdout's recordings, so that their scatter does
+    /// not count.
     pub fn beside_zeros(&self, measured: &[f64]) -> Vec<f64> {
         rms::<N>(measured, &self.with_zeros)
     }
@@ -135,8 +136,8 @@ pub fn gap<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     }
 }
 
-/// RMS errors of a model on the second halves of the holdout logs, with positions as measured and with the encoder zeros that the first halves show; none where
-/// recordings do not differ or a half has no window.
+/// RMS errors of a model on the second halves of the holdout logs, with positions as measured and with the encoder zeros that the first halves show;
+/// none where recordings do not differ or a half has no window.
 fn second_halves<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     context: &DiagnosisContext<A, N, P>,
     model: &Hypothesis<P>,

@@ -14,8 +14,8 @@ use armgap_core::effect::{NEVER, Trial};
 /// Probability below which a cause is not named.
 const NAMEABLE: f64 = 0.3;
 
-/// Probability below which a fitted value that arms hardly ever have (a negative spring stiffness) is not named. Single logs of a real arm whose encoders start
-/// from another zero each gave negative stiffnesses up to 0.80 (docs/real-arm.md).
+/// Probability below which a fitted value that arms hardly ever have (a negative spring stiffness) is not named. Single logs of a real arm whose
+/// encoders start from another zero each gave negative stiffnesses up to 0.80 (docs/real-arm.md).
 const LIKELY: f64 = 0.9;
 
 /// Gains of a drive, delivered over commanded torque: beyond this range, the unit of the torque column is wrong, not the drive.
@@ -72,8 +72,9 @@ fn impossible(effect: &EffectInstance, probability: f64) -> Option<String> {
     }
 }
 
-/// Reason why the size of an effect cannot be told from zero: its standard deviation is as large as the size; none if it can be. Effects with a threshold or a
-/// transmission always pass, as their standard deviation is along other values too and the search has compared the whole effect with its absence.
+/// Reason why the size of an effect cannot be told from zero: its standard deviation is as large as the size; none if it can be. Effects with a
+/// threshold or a transmission always pass, as their standard deviation is along other values too and the search has compared the whole effect with
+/// its absence.
 fn uncertain(effect: &EffectInstance, sigma: &[f64]) -> Option<String> {
     let spec = effect.law.spec();
     // Along a ray all values leave nothing together, and the first is the size.
@@ -90,7 +91,8 @@ fn uncertain(effect: &EffectInstance, sigma: &[f64]) -> Option<String> {
     })
 }
 
-/// Splits `all` into at most `allowed` items to be named, for which `why_not` gives no reason, and the rest with reasons; `most` is the limit in messages.
+/// Splits `all` into at most `allowed` items to be named, for which `why_not` gives no reason, and the rest with reasons; `most` is the limit in
+/// messages.
 fn sorted<T>(
     all: Vec<T>,
     allowed: usize,
@@ -115,8 +117,8 @@ fn sorted_causes(causes: &[Cause], most: usize) -> (Vec<Cause>, Vec<Unnamed<Caus
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
     /// Names at most `most` causes and external disturbances of a search's `conclusion` together, and fits the model with them.
     ///
-    /// Effects come before disturbances, and of disturbances the clearest first. Disturbances that are not named are taken out of the logs; if no disturbance is
-    /// named, the search without disturbances counts.
+    /// Effects come before disturbances, and of disturbances the clearest first. Disturbances that are not named are taken out of the logs; if no
+    /// disturbance is named, the search without disturbances counts.
     pub fn headline(&mut self, conclusion: Conclusion<N, P>, most: usize) -> Headline<N, P> {
         let Conclusion { mut attribution, alone, mut disturbances } = conclusion;
         self.weigh(&mut attribution);
@@ -148,7 +150,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         }
     }
 
-    /// Model with the named causes alone, its window weights, and whether its gap is open; `changed` says that some found cause or disturbance is not named.
+    /// Model with the named causes alone, its window weights, and whether its gap is open; `changed` says that some found cause or disturbance is not
+    /// named.
     fn reported(
         &self,
         attribution: &Attribution<N, P>,

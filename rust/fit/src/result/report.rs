@@ -370,7 +370,8 @@ pub struct LogSummary {
     pub duration_s: f64,
     /// Number of prediction windows cut from the log.
     pub windows: usize,
-    /// Encoder readings at the model's zero position in this log, less their part common to all recordings; where there are several training recordings.
+    /// Encoder readings at the model's zero position in this log, less their part common to all recordings; where there are several training
+    /// recordings.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub encoder_zero: Option<Values>,
 }

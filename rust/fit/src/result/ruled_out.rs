@@ -129,7 +129,8 @@ fn status<A, const N: usize, const P: usize>(
     }
 }
 
-/// The named cause in whose place the effect `place` would have done nearly as well, by the motion or by what it makes of the arm's parameters.
+/// The named cause that the effect `place` could replace: when the cause was added, the effect lowered the gap, or restored the parameters' prior
+/// values, nearly as well.
 fn rivalled<const N: usize, const P: usize>(
     attribution: &Attribution<N, P>,
     place: &EffectInstance,
@@ -146,7 +147,7 @@ fn rivalled<const N: usize, const P: usize>(
     })
 }
 
-/// Makes an absent effect undecided that would do nearly as well in place of the named cause `instead`.
+/// Changes the status of an absent effect to undecided, as the effect would do nearly as well in place of the named cause `instead`.
 fn leave_open(entry: &mut RuledOut, instead: &EffectInstance) {
     if entry.status == Status::Absent {
         (entry.status, entry.bound) = (Status::Undecided, None);

@@ -20,8 +20,9 @@ const UNSEEN: f64 = 0.71;
 const STUCK: &str = "beside so large a gap the logs say less about the parameters than the arm file does, and their values stayed near \
      it; check signs, zeros and units first";
 
-/// Largest standard deviation of a parameter relative to its value (or to the largest value of the same unit): a value ten times as large then costs one square,
-/// as good as nothing beside any log, and steps of finite differences, which go by the standard deviation, stay on the arm.
+/// Largest standard deviation of a parameter relative to its value (or to the largest value of the same unit). A value ten times as large then costs
+/// one unit of squared deviation, which any log outweighs, and steps of finite differences, which are proportional to the standard deviation, lead to
+/// no impossible arm.
 const WIDEST: f64 = 10.0;
 
 /// Reason why a re-estimated parameter is not to be believed.

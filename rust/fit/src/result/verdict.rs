@@ -4,11 +4,12 @@ use crate::likelihood::holdout::CONSEQUENTIAL_ERROR;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-/// Claimed noise floors beyond which a prediction error is not noise. Four true floors are not: RMS errors of as few as ten windows, each with one initial state,
-/// scatter by less than twice. On one joint of twenty the claimed floor is 1.25 times the true one (docs/input-defects.md).
+/// Ratio of a prediction error to the estimated noise floor above which the error is more than noise. Four times the true floor is more than noise,
+/// as RMS errors of even ten windows, each with one initial state, scatter by less than a factor of two; and on one joint of twenty the estimated
+/// floor is 1.25 times the true one (docs/input-defects.md).
 pub const ABOVE_NOISE: f64 = 3.2;
 
-/// Share of a joint's error that re-estimated parameters must remove to be called an improvement: less is of no use to anyone.
+/// Share of a joint's error that re-estimated parameters must remove to be called an improvement.
 const IMPROVEMENT: f64 = 0.2;
 
 /// Ratio of an error to its noise floor below which nothing is left to improve: the floor itself is known to a factor of about 1.4.
@@ -88,7 +89,8 @@ mod tests {
 
     const FLOOR: f64 = 1e-3;
 
-    /// Verdict on two joints, of which the second has errors of `errors` noise floors (arm file, re-estimated, reported model) and a motion of `motion` floors.
+    /// Verdict on two joints, of which the second has errors of `errors` noise floors (arm file, re-estimated, reported model) and a motion of
+    /// `motion` floors.
     fn of(errors: [f64; 3], motion: f64, open: bool, named: bool) -> Verdict {
         let [before, refit, after] = errors.map(|e| [0.1 * FLOOR, e * FLOOR]);
         let (floor, motion) = ([FLOOR; 2], [1.0, motion * FLOOR]);

@@ -1,7 +1,7 @@
 //! Acceptance criteria of a cause in the model search.
 //!
-//! A cause is accepted when it removes a part of the gap that matters, on windows of other motions too, and by more than the windows' own scatter, or when it
-//! brings the parameters back to their prior values.
+//! A cause is accepted when it removes a part of the gap that matters, on windows of other motions too, and by more than the windows' own scatter, or
+//! when it brings the parameters back to their prior values.
 
 use crate::likelihood::holdout::CONSEQUENTIAL_ERROR;
 use crate::likelihood::holdout::is_plausible;
@@ -15,7 +15,8 @@ pub const CERTAIN: f64 = 3.5;
 /// Mean advantage per window, in standard errors, below which a nuisance, which is never named, is not accepted.
 const CERTAIN_ENOUGH: f64 = 2.5;
 
-/// Mean advantage per holdout window, in standard errors, below which a cause is not accepted: on the holdout alone it must not fail.
+/// Mean advantage per holdout window, in standard errors, below which a cause is not accepted: the holdout alone has fewer windows and must only
+/// agree.
 const HOLDOUT_CERTAIN: f64 = 1.0;
 
 /// Share of the gap above the noise floor below which an improvement does not matter.
@@ -27,17 +28,20 @@ const MATTERS_IN_SMALL: f64 = 0.5;
 /// Ratio of the cost to its noise floor below which there is nothing left to explain.
 pub const ABOVE_FLOOR: f64 = 1.25;
 
-/// Cost of a typical window, relative to what noise alone leaves, up to which a gap is that of a few windows.
+/// Cost of a typical window, relative to what noise alone leaves, up to which a gap is due to a few outlying windows.
 const AT_FLOOR: f64 = 1.5;
 
-/// Least decrease of cost in the few windows that make a gap, in costs of a typical window; largest rise in other windows, as a part of the decrease.
+/// Least decrease of the cost of outlying windows by a candidate that explains them, in costs of a typical window.
 const OUTLYING: f64 = 25.0;
+
+/// Largest increase of the cost of all other windows by a candidate that explains outlying windows, as a part of the decrease of their cost.
 const HARMLESS: f64 = 0.05;
 
 /// Decrease of the prior cost, in squared sigmas, that makes a cause on its own.
 pub const TRUST_GAIN: f64 = 16.0;
 
-/// Gap, relative to the motion, above which implausible parameters are no evidence of a cause while the gap is unexplained: the gap may have moved them.
+/// Gap, relative to the motion, above which implausible parameters are no evidence of a cause while the gap is unexplained: the gap may have moved
+/// them.
 const TRUSTWORTHY: f64 = 0.01;
 
 /// Difference of prior costs, in squared sigmas, below which two candidates are look-alikes.
@@ -49,17 +53,20 @@ pub const UNEXPLAINED: f64 = 4.0;
 /// Improvement relative to the motion within a window below which an effect is of no consequence.
 pub const RELEVANT: f64 = 1e-4;
 
-/// Smallest gap, relative to the motion, that is searched for causes: too small for a name by itself, but searched if it stands far above the noise floor.
+/// Smallest gap, relative to the motion, that is searched for causes: a gap too small to matter by itself, which is searched if it stands far above
+/// the noise floor.
 pub const FAINTEST: f64 = 5e-6;
-/// Ratio of the cost to its noise floor from which a gap too small for a name by itself is searched for causes.
+/// Ratio of the cost to its noise floor from which a gap too small to matter by itself is searched for causes.
 pub const CLEAR: f64 = 2.75;
 
-/// Share of a gap too small for a name by itself that a cause must explain, and its mean advantage in standard errors: no integrator error does.
+/// Share of a gap too small to matter by itself that a cause must explain: no error of the integrator explains as much.
 const MATTERS_IF_FAINT: f64 = 0.7;
+
+/// Mean advantage per window, in standard errors, that a cause of a gap too small to matter by itself must have.
 const CERTAIN_IF_FAINT: f64 = 5.0;
 
-/// Power of the explained share of the gap in the probability of causes: effects that are in no library were seen to be imitated by two or three that are, for up
-/// to eight tenths of the gap.
+/// Power of the explained share of the gap in the probability of causes: effects that are in no library were seen to be imitated by two or three that
+/// are, for up to eight tenths of the gap.
 pub const REMAINDER_POWER: i32 = 6;
 
 /// Improvement relative to the first gap below which an effect is no cause of the gap.
@@ -86,8 +93,8 @@ const MOST: f64 = 0.5;
 /// Part of the winner's advantage within which the cost of a look-alike lies.
 const LOOK_ALIKE: f64 = 0.03;
 
-/// Smallest improvement, RMS relative to the motion, for which a cause is named, given the relative error `first_gap` before any cause. What is of consequence by
-/// itself is always named.
+/// Smallest improvement, RMS relative to the motion, for which a cause is named, given the relative error `first_gap` before any cause. What is of
+/// consequence by itself is always named.
 pub fn min_relevance(first_gap: f64) -> f64 {
     (NOTICEABLE * first_gap).clamp(RELEVANT, CONSEQUENTIAL_ERROR)
 }
@@ -99,10 +106,11 @@ impl<const N: usize, const P: usize> SearchNode<N, P> {
         other.score() - best.score() < (LOOK_ALIKE * advantage).max(3.0) || best.z_over(other) < 1.0
     }
 
-    /// Whether a candidate explains windows that stand far out of noise, in training and holdout, at no cost to any other.
+    /// Whether a candidate explains windows whose errors stand far out of the noise, in training and holdout, while no other window gets worse.
     ///
-    /// An effect that shows in a few windows, such as a joint limit that is hardly touched, never has a mean advantage of many standard errors. Where all other
-    /// windows are at the noise floor, it needs none: their noise is known, and what it takes away is not noise.
+    /// An effect that shows in a few windows, such as a joint limit that is hardly touched, never has a mean advantage of many standard errors. The
+    /// effect needs none where all other windows are at the noise floor: the noise is known there, and the errors that the effect explains are not
+    /// noise.
     fn settles_outliers(&self, candidate: &Candidate<P>) -> bool {
         let windows = self.base.holdout.len() as f64;
         self.weights.holdout.typical < AT_FLOOR * self.floor / windows
@@ -111,7 +119,8 @@ impl<const N: usize, const P: usize> SearchNode<N, P> {
             && self.settles(&candidate.holdout, &self.base.holdout)
     }
 
-    /// Whether fit `fit` explains windows of the training or of the holdout that stand far out of noise under fit `other`, at no cost to any of the rest.
+    /// Whether fit `fit` explains windows of the training or of the holdout that stand far out of noise under fit `other`, while no other window gets
+    /// worse.
     pub fn takes_outliers(&self, fit: &Candidate<P>, other: &Candidate<P>) -> bool {
         self.settles(&fit.training, &other.training) || self.settles(&fit.holdout, &other.holdout)
     }
@@ -123,7 +132,8 @@ impl<const N: usize, const P: usize> SearchNode<N, P> {
         gain > OUTLYING * self.weights.holdout.typical && -loss < HARMLESS * gain
     }
 
-    /// Whether an effect would show in the gap of this node: a small gap may be an integrator's error, which is like a shift in time or a stiff shaft.
+    /// Whether an effect is accepted as a cause of a gap of this size: an error of the integrator, which resembles a shift in time or a stiff shaft,
+    /// may make a small gap.
     pub fn shows(&self, effect: Option<&EffectInstance>) -> bool {
         self.relative_error() > RELEVANT
             || effect.is_some_and(|e| {
@@ -162,7 +172,7 @@ pub fn choose<const N: usize, const P: usize>(
         .map(|index| (index, Ground::Trust))
 }
 
-/// The best candidate that describes an arm; one with a value at its bound gives way to one that does almost as well without.
+/// The best candidate whose values are possible; a candidate with a value at its bound gives way to one that does almost as well without.
 pub fn best<const N: usize, const P: usize>(node: &SearchNode<N, P>, regularised: bool) -> Option<usize> {
     let open = |i: &usize| node.candidates[*i].effect.is_some() || !regularised;
     let first = (0..node.candidates.len()).find(open)?;
@@ -176,8 +186,8 @@ pub fn is_possible<const P: usize>(candidate: &Candidate<P>) -> bool {
     candidate.size < AT_BOUND && !candidate.is_idle()
 }
 
-/// The candidate with the fewest parameters among those that do almost as well as candidate `best`: a spring with a far-off rest position is an offset, and a
-/// hysteresis over next to no path is regularised friction.
+/// The candidate with the fewest parameters among those that do almost as well as candidate `best`: a spring with a far-off rest position is an
+/// offset, and a hysteresis over next to no path is regularised friction.
 fn simplest<const N: usize, const P: usize>(
     node: &SearchNode<N, P>,
     best: usize,
@@ -194,7 +204,7 @@ fn simplest<const N: usize, const P: usize>(
     fewest_values(&offers, best, almost)
 }
 
-/// Figures of a candidate from which the simplest of several candidates is chosen.
+/// Decrease of the cost, number of values and acceptance of one candidate, from which the simplest of several candidates is chosen.
 #[derive(Debug, Clone, Copy)]
 struct Offer {
     /// Decrease of the cost by the candidate.
@@ -205,8 +215,8 @@ struct Offer {
     moves: bool,
 }
 
-/// Index of the offer with the fewest values among those that are accepted by themselves and reach more than the part `almost` of the advantage of offer `best`;
-/// the first of several.
+/// Index of the candidate (`offers`) with the fewest values, the first of several, among those that are accepted by themselves and reach more than
+/// the part `almost` of the advantage of candidate `best`.
 fn fewest_values(offers: &[Offer], best: usize, almost: f64) -> usize {
     let Offer { advantage, values, .. } = offers[best];
     if values == 0 {
@@ -217,8 +227,8 @@ fn fewest_values(offers: &[Offer], best: usize, almost: f64) -> usize {
     (0..offers.len()).filter(as_good).min_by_key(|i| (offers[*i].values, *i)).unwrap_or(best)
 }
 
-/// Number of a candidate's free values beyond the arm's parameters: those of its effect, or one for the width of friction regularisation while that is open. Zero
-/// of a candidate that is not to be chosen for its simplicity.
+/// Number of a candidate's free values beyond the arm's parameters: those of its effect, or one for the width of friction regularisation while that
+/// is open. Zero of a candidate that is not to be chosen for its simplicity.
 fn free_values<const P: usize>(candidate: &Candidate<P>, regularised: bool) -> usize {
     let width = usize::from(!regularised && candidate.fit.hypothesis.is_rounded());
     candidate.effect.as_ref().map_or(width, EffectInstance::len)

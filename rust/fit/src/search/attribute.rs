@@ -60,7 +60,8 @@ impl<const P: usize> Candidate<P> {
         self.training.iter().chain(&self.holdout).sum::<f64>() + self.fit.prior_cost
     }
 
-    /// Whether an effect that changes the arm wherever it sits has come down to nothing: its other parameters then stand for something else.
+    /// Whether the candidate's effect, of those tested by their whole change of the predictions, has a size near zero, so that its other parameters
+    /// have no meaning.
     pub fn is_idle(&self) -> bool {
         self.effect.is_some_and(|e| e.law.spec().trial == Trial::Whole) && self.size < IDLE
     }
@@ -110,7 +111,8 @@ pub struct SearchNode<const N: usize, const P: usize> {
     pub candidates: Vec<Candidate<P>>,
     /// Every candidate that was fitted, with the share of the gap it removes under the current model's own weights, best first.
     pub field: Vec<(Candidate<P>, f64)>,
-    /// First-order tests of all candidates around the settled model, the open ones first; empty if they were made under other weights than the node has.
+    /// First-order tests of all candidates around the settled model, the open ones first; empty if they were made under other weights than the node
+    /// has.
     pub screened: Vec<ScoreTest>,
     /// Weights of the training and holdout windows, common to all candidates.
     pub weights: SplitWeighting<N>,
@@ -173,7 +175,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         self.node_around(self.settle(current, scale), min_relevance)
     }
 
-    /// The search node around a fit under weights of its own residual; improvements below `min_relevance`, relative to the motion, are not looked for.
+    /// The search node around a fit under weights of its own residual; improvements below `min_relevance`, relative to the motion, are not looked
+    /// for.
     pub fn node_around(
         &self,
         (fit, weights): (Fit<P>, SplitWeighting<N>),
@@ -222,8 +225,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         fitted.iter().filter(|c| c.effect.is_some()).map(|c| (c.clone(), share(c))).collect()
     }
 
-    /// Fits all initial guesses and judges them, best first; `jacobian` is that of the model `base` they add to, where it is known. Candidates that diverged or
-    /// whose effect came down to nothing are left out.
+    /// Fits all initial guesses and judges them, best first; `jacobian` is that of the model `base` they add to, where it is known. Candidates that
+    /// diverged or whose effect vanished are left out.
     pub(crate) fn fit_candidates(
         &self,
         weights: &SplitWeighting<N>,
@@ -315,8 +318,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         FinalRound { base, candidates, weights: heavier }
     }
 
-    /// Alternatives to a candidate whose effect is a transmission: encoder and friction on other sides that they may be on, those that explain the training
-    /// windows best before another fit.
+    /// Alternatives to a candidate whose effect is a transmission: encoder and friction on other sides that they may be on, those that explain the
+    /// training windows best before another fit.
     fn other_sides(&self, candidate: &Candidate<P>, weights: &SplitWeighting<N>) -> Vec<Hypothesis<P>> {
         let Some(effect) = candidate.effect.filter(|effect| effect.law.has_transmission()) else {
             return Vec::new();
@@ -343,7 +346,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     }
 }
 
-/// Candidates ordered by cost, none twice, without those that diverged or whose effect came down to nothing.
+/// Candidates ordered by cost, none twice, without those that diverged or whose effect vanished.
 fn ranked<const P: usize>(mut candidates: Vec<Candidate<P>>) -> Vec<Candidate<P>> {
     candidates.retain(|c| c.score().is_finite() && !c.is_idle());
     candidates.sort_by(|a, b| a.score().total_cmp(&b.score()));

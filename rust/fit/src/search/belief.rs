@@ -72,8 +72,8 @@ pub fn name<const N: usize, const P: usize>(
     }
 }
 
-/// Probability that the candidate `choice`, one of its look-alikes `listed`, or one that no motion tells from it, has the lowest cost when the windows are drawn
-/// again.
+/// Probability that the candidate `choice`, one of its look-alikes `listed`, or one that no motion tells from it, has the lowest cost when the
+/// windows are drawn again.
 fn probability<const N: usize, const P: usize>(
     node: &SearchNode<N, P>,
     choice: usize,
@@ -113,8 +113,8 @@ pub fn probability_over<const P: usize>(one: &Candidate<P>, other: &Candidate<P>
     (wins as f64 + 0.5) / (RESAMPLES as f64 + 1.0)
 }
 
-/// Probability of the candidate `choice`, or one that no motion tells from it, among all effects that would restore the prior values of the parameters, from their
-/// prior costs.
+/// Probability of the candidate `choice`, or one that no motion tells from it, among all effects that would restore the prior values of the
+/// parameters, from their prior costs.
 fn trust_probability<const N: usize, const P: usize>(node: &SearchNode<N, P>, choice: usize) -> f64 {
     let best = node.candidates[choice].fit.prior_cost;
     let free = |c: &Candidate<P>| c.effect.as_ref().map_or(0, EffectInstance::len) as f64;

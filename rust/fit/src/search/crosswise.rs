@@ -1,9 +1,9 @@
 //! Interleaved cross-validation, for training logs that do not show what the holdout does.
 //!
-//! A stop that only the motion of the holdout reaches, a spring that only its speeds make worth telling from friction: no effect fitted to the training logs
-//! explains such a gap, and judged on both sets of logs, the right effect is worth nothing. So where a diagnosis ends with a gap, every log is cut into stretches
-//! that are fitted to and judged on by turns. Both kinds of motion are then in both sets, and what explains nearly all of the gap has been judged on stretches
-//! that it was not fitted to.
+//! A stop that only the motion of the holdout reaches, a spring that differs from friction only at the holdout's speeds: no effect fitted to the
+//! training logs explains such a gap, and judged on both sets of logs, the right effect is worth nothing. So where a diagnosis ends with a gap, every
+//! log is cut into stretches, of which every other one is fitted to and the rest judged on. Both kinds of motion are then in both sets, and what
+//! explains nearly all of the gap has been judged on stretches that it was not fitted to.
 
 use crate::likelihood::context::DiagnosisContext;
 use crate::log::cut::cut;
@@ -29,8 +29,8 @@ const MUCH_LESS: f64 = 0.1;
 const MORE: f64 = 2.0;
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// Whether a search ended with a much larger prediction error on the holdout than on the training logs: only then can interleaved cross-validation tell more
-    /// than the logs as they are.
+    /// Whether a search ended with a much larger prediction error on the holdout than on the training logs: only then can interleaved
+    /// cross-validation tell more than the logs as they are.
     pub(crate) fn holdout_shows_more(&self, attribution: &Attribution<N, P>) -> bool {
         let Some(last) = attribution.nodes.last() else { return false };
         let per_row = |costs: &[f64], rows: usize| costs.iter().sum::<f64>() / rows as f64;

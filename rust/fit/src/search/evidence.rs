@@ -1,9 +1,9 @@
 //! Evidence for a cause in the final model, and the probability that the cause is in the arm.
 //!
-//! A real arm always lacks something that has no name, so an unexplained remainder is no evidence against a cause by itself. What counts is how the cause's own
-//! part compares with the remainder: an effect that is not in the arm takes up a part of the remainder, and another part under another motion. So the probability
-//! follows from three figures: how often the cause is chosen when the windows are drawn again, by how much the holdout's error rises without it, and whether the
-//! holdout asks for the same size as the training logs.
+//! A real arm always has effects that the library lacks, so an unexplained remainder of the gap is no evidence against a cause by itself. What counts
+//! is how the cause's own part compares with the remainder: an effect that is not in the arm takes up a part of the remainder, and another part under
+//! another motion. So the probability follows from three figures: how often the cause is chosen when the windows are drawn again, by how much the
+//! holdout's error rises without it, and whether fits to the holdout and to the training logs give it the same size.
 
 use crate::likelihood::context::DiagnosisContext;
 use crate::likelihood::holdout::is_plausible;
@@ -23,18 +23,18 @@ const SAME: f64 = 0.15;
 /// Mean and scatter of the size of an effect that is not in the arm, as fitted to one log relative to another.
 const OTHER: [f64; 2] = [0.7, 0.8];
 
-/// Odds of a cause that removes as much as remains with it and whose size nothing confirms or contradicts. Fitted to names on arms of a simulator that is not the
-/// library's (docs/decisions/034-probability-of-a-cause.md), so it holds their base rate: most lack several effects of the library, two of five one that the
-/// library does not have. Halved, the log loss on these arms grows by a fifth; doubled, it falls by a thirtieth, and of the names from 0.75 to 0.9 fewer are right
-/// than claimed.
+/// Odds of a cause that removes as much of the gap as remains with it, and whose size the holdout neither confirms nor contradicts. Fitted to causes
+/// named on arms of another simulator (docs/decisions/034-probability-of-a-cause.md), of which most lack several effects of the library, and two of
+/// five an effect that the library does not have. With half the value the log loss on these arms grows by a fifth; with twice the value it falls by a
+/// thirtieth, but of the causes named at 0.75 to 0.9 fewer are right than claimed.
 const PRIOR_ODDS: f64 = 2.0;
 
-/// Power of a cause's gain in its odds, fitted as `PRIOR_ODDS` is: gains that differ by what else an arm lacks say less than their ratio. At 1 the log loss is
-/// larger by a twelfth.
+/// Power of a cause's gain in its odds, fitted as `PRIOR_ODDS` is: gains that differ by what else an arm lacks say less than their ratio. At 1 the
+/// log loss is larger by a twelfth.
 const GAIN_POWER: f64 = 0.5;
 
-/// Power, in the odds of a cause, of the gap left by a law without a name relative to the gap left by the cause; fitted as `PRIOR_ODDS` is. At 1 the log loss is
-/// larger by a fifth, at 3 by a hundredth.
+/// Power, in the odds of a cause, of the ratio of the gap left by an unnamed law (a table over one variable in place of the cause) to the gap left by
+/// the cause; fitted as `PRIOR_ODDS` is. At 1 the log loss is larger by a fifth, at 3 by a hundredth.
 const RIVAL_POWER: i32 = 4;
 
 /// Evidence for a cause in the final model.
@@ -42,24 +42,24 @@ const RIVAL_POWER: i32 = 4;
 pub struct Evidence {
     /// How often the cause has the lowest cost of all candidates when the windows are drawn again, at the search node where it was added, 0 to 1.
     pub selected: f64,
-    /// Rise of the holdout's cost without the cause, everything else fitted again, relative to the cost above the noise floor with the cause; none where no more
-    /// than noise remains.
+    /// Rise of the holdout's cost without the cause, everything else fitted again, relative to the cost above the noise floor with the cause; none
+    /// where no more than noise remains.
     pub gain: Option<f64>,
     /// Standard error of the gain, from the scatter between the holdout's windows.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gain_sigma: Option<f64>,
-    /// Fall of the holdout's cost by a law without a name in the cause's place (the table over one variable that predicts best what the arm leaves without the
-    /// cause), relative to the cost above the noise floor with the cause; none where no table predicts.
+    /// Decrease of the holdout's cost by an unnamed law in the cause's place (the table over one variable that predicts best what the arm leaves
+    /// without the cause), relative to the cost above the noise floor with the cause; none where no table predicts.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rival_gain: Option<f64>,
-    /// Size of the effect that the holdout asks for, relative to that of the training logs; none where a size has no direction.
+    /// Size of the effect as fitted to the holdout, relative to its size fitted to the training logs; none where a size has no direction.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_ratio: Option<f64>,
     /// Standard deviation of the size ratio.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_ratio_sigma: Option<f64>,
-    /// Odds that the encoder zeros of the recordings have a common mean, rather than scatter around none; only for an offset of the encoder's zero or its
-    /// equivalents, and none where recordings do not differ.
+    /// Odds that the encoder zeros of the recordings have a common mean, rather than scatter around none; only for an offset of the encoder's zero or
+    /// its equivalents, and none where recordings do not differ.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub beyond_scatter: Option<f64>,
 }
@@ -76,7 +76,7 @@ impl Evidence {
         beyond * self.selected * odds / (1.0 + odds)
     }
 
-    /// Gap left by a law without a name in the cause's place, relative to the gap that the cause leaves: 0 to 1.
+    /// Gap left by an unnamed law (a table over one variable) in the cause's place, relative to the gap that the cause leaves: 0 to 1.
     fn left_by_rival(&self) -> f64 {
         let (Some(gain), Some(rival)) = (self.gain, self.rival_gain) else { return 1.0 };
         (1.0 + gain - rival).clamp(0.0, 1.0)
@@ -137,8 +137,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     }
 }
 
-/// Joint (from 0) whose encoder an effect makes count from another zero, and that zero, rad or m; a tilted base does the same to the first joint of an arm in a
-/// plane.
+/// Joint (from 0) whose encoder an effect makes count from another zero, and that zero, rad or m; a tilted base does the same to the first joint of
+/// an arm in a plane.
 fn zero_of(effect: &EffectInstance) -> Option<(usize, f64)> {
     let [at_zero, at_one] = [0.0, 1.0].map(|q| effect.law.measured(&effect.p, q));
     let tilt = effect.law.tilt(&effect.p);
@@ -166,8 +166,8 @@ fn is_more_than_noise<const N: usize, const P: usize>(last: &SearchNode<N, P>) -
     last.excess() > if last.is_open() { ABOVE_FLOOR } else { UNEXPLAINED }
 }
 
-/// Size of effect `place` in fit `other` relative to its size in fit `of`, along the values in `of`, and the ratio's standard deviation; none for an effect whose
-/// first parameter is no amplitude.
+/// Size of effect `place` in fit `other` relative to its size in fit `of`, along the values in `of`, and the ratio's standard deviation; none for an
+/// effect whose first parameter is no amplitude.
 fn size_ratio<const P: usize>(place: usize, of: &Fit<P>, other: &Fit<P>) -> Option<(f64, f64)> {
     let effects = &of.hypothesis.effects;
     let (one, two) = (&effects[place], &other.hypothesis.effects[place]);

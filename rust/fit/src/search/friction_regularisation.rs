@@ -1,8 +1,9 @@
 //! Friction regularisation: the widths over which the sign of friction changes around standstill, fitted as a nuisance.
 //!
-//! Dry friction jumps at standstill; the friction of many simulators, and of joints that creep, follows `tanh(dq / width)`, on every joint with a width of its
-//! own. The widths are no cause of a gap that has a name, but a model with wrong widths misses every reversal, and this error hides small causes, or takes the
-//! name of an effect that acts at reversals too. So the model with the best widths is a rival of every candidate, and of every cause that is to stay.
+//! Dry friction jumps at standstill; the friction of many simulators, and of joints that creep, follows `tanh(dq / width)`, on every joint with a
+//! width of its own. The widths are no cause of a gap that has a name, but a model with wrong widths misses every reversal, and this error hides
+//! small causes, or takes the name of an effect that acts at reversals too. So the model with the best widths is a rival of every candidate, and of
+//! every cause that is to stay.
 
 use crate::likelihood::context::{DiagnosisContext, SplitWeighting};
 use crate::likelihood::solve::{Effort, Fit, FitProblem};
@@ -24,8 +25,8 @@ const EVALUATIONS: [u64; 2] = [6, 7];
 /// Times that the widths of friction regularisation are searched, with the parameters fitted between.
 const ROUNDS: usize = 2;
 
-/// Widths of friction regularisation by joint, rad/s or m/s, of least cost, and that cost: the best of `tried` on all joints, then a common width near it, then
-/// one for each joint.
+/// Widths of friction regularisation by joint, rad/s or m/s, of least cost, and that cost: the best of `tried` on all joints, then a common width
+/// near it, then one for each joint.
 fn least_widths<const N: usize>(
     cost: impl Fn([f64; N]) -> f64,
     tried: impl IntoIterator<Item = f64>,
@@ -60,8 +61,8 @@ fn least_widths<const N: usize>(
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// The model with the widths of friction regularisation that suit the training windows best, its values estimated again to first order from its `jacobian`;
-    /// none where no width does better than the model's own.
+    /// The model with the widths of friction regularisation that suit the training windows best, its values estimated again to first order from its
+    /// `jacobian`; none where no width does better than the model's own.
     pub(crate) fn with_best_widths(
         &self,
         problem: &FitProblem<A, N, P>,
@@ -75,7 +76,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         (least < now).then(|| model.rounded_over(widths))
     }
 
-    /// Alternatives to a model: with the widths of friction regularisation that suit it best, and with dry friction if the model's friction is regularised now.
+    /// Alternatives to a model: with the widths of friction regularisation that suit it best, and with dry friction if the model's friction is
+    /// regularised now.
     pub fn regularisation_guesses(
         &self,
         model: &Hypothesis<P>,
@@ -87,8 +89,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         regularised.into_iter().chain(exact).collect()
     }
 
-    /// The best fit of a model to the training windows, with its own widths of friction regularisation or with those that suit it best: what a model with a
-    /// further cause is compared with.
+    /// The best fit of a model to the training windows, with its own widths of friction regularisation or with those that suit it best: what a model
+    /// with a further cause is compared with.
     pub(crate) fn fit_with_any_rounding(&self, model: &Hypothesis<P>, weights: &SplitWeighting<N>) -> Fit<P> {
         let problem = self.problem(&weights.training);
         let fit = problem.solve(model, Effort::FULL);

@@ -3,8 +3,8 @@
 //! * `acceptance`: acceptance criteria of a cause.
 //! * `attribute`: one search node, candidates fitted in full under common weights.
 //! * `belief`: selection probability of a cause.
-//! * `crosswise`: interleaved cross-validation, logs cut into stretches that are fitted to and judged on by turns.
-//! * `evidence`: what a cause rests on in the final model.
+//! * `crosswise`: interleaved cross-validation, logs cut into stretches of which every other one is fitted to and the rest judged on.
+//! * `evidence`: evidence for each cause in the final model, and the cause's probability.
 //! * `friction_regularisation`: width over which the sign of friction is regularised, a nuisance.
 //! * `model_search`: stepwise selection, one cause after another, and causes that become idle.
 //! * `reconsider`: a rival in the place of its cause, once the other causes are known.

@@ -120,8 +120,9 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
 
     /// The node around the arm with its parameters re-estimated, with or without encoder zeros that differ between recordings.
     ///
-    /// Encoder zeros take up what a recording misses by on average, a large missing effect's part too, and then other effects fit what is left. So the first cause
-    /// is sought with zeros where these explain more than the cause would, or where no cause is found; later nodes always have zeros.
+    /// Encoder zeros that differ between recordings also take up the mean error that a large missing effect makes in a recording; other effects would
+    /// then be fitted to the rest. So the first cause is sought with such zeros only where they explain more than the cause would, or where no cause
+    /// is found without them; later nodes always have them.
     fn first_node(
         &self,
         nominal: &Hypothesis<P>,
@@ -201,8 +202,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         }
     }
 
-    /// Restarts a search that has ended with a gap, from its first node with another pair of causes, as the first cause may have stood in for both. Only a pair
-    /// that explains nearly all of the gap counts.
+    /// Restarts a search that has ended with a gap, from its first node with another pair of causes, as the first cause may have stood in for both.
+    /// Only a pair that explains nearly all of the gap counts.
     fn restarted(
         &self,
         mut search: ModelSearch<N, P>,
@@ -231,8 +232,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         search.threshold = self.look_closer(&mut search.node, settled, min_relevance, UNEXPLAINED);
     }
 
-    /// Searches for causes of a gap that is too small to matter by itself and yet exceeds the noise floor by the factor `clear`; returns the smallest improvement
-    /// that counts, relative to the motion. `settled` is the fit that `node` was made around.
+    /// Searches for causes of a gap that is too small to matter by itself and yet exceeds the noise floor by the factor `clear`; returns the smallest
+    /// improvement that counts, relative to the motion. `settled` is the fit that `node` was made around.
     fn look_closer(
         &self,
         node: &mut SearchNode<N, P>,

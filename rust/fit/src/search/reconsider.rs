@@ -1,9 +1,10 @@
 //! Correction of a choice between rivals that was made too early in a model search.
 //!
-//! Of two effects that look alike, such as a lag and a delay, the better one may show only once the other causes are known: beside a gap ten times as large, what
-//! tells them apart is noise. And what a law with more values explained beyond one with fewer may have been the doing of a cause that was found later. So before a
-//! further cause is looked for, each rival takes the place of its cause beside all others; if it does better, or as well with fewer values, the search goes on
-//! from there again. The better end counts, if it is reached with no more causes: beside a gap, more are added by what they are not about.
+//! Of two effects that look alike, such as a lag and a delay, the better one may show only once the other causes are known: in a gap ten times as
+//! large, the difference between them is noise. And what a law with more values explained beyond a law with fewer may have been the effect of a cause
+//! that was found later. So before a further cause is looked for, each rival takes the place of its cause beside all other causes; if the rival does
+//! better, or as well with fewer values, the search goes on from there again. The search that ends with the smaller error counts, if it has no more
+//! causes: while a gap remains, further causes may be added that only imitate it.
 
 use crate::likelihood::context::DiagnosisContext;
 use crate::likelihood::solve::Effort;
@@ -16,7 +17,7 @@ use crate::search::model_search::{ModelSearch, added};
 use crate::search::rivals::equivalent;
 use armgap_core::arm::Arm;
 
-/// Share of its cause's gain that a rival has to explain at the node where the cause was added.
+/// Share of the gain of a cause that a rival has to explain at the node where the cause was added.
 const RIVALS: f64 = 0.5;
 
 /// Rivals that are tried for each cause at most.
@@ -28,8 +29,8 @@ const BETTER: f64 = 2.0;
 /// Factor by which the prediction error may be larger at the end of a search from a rival with fewer values.
 const AS_WELL: f64 = 1.05;
 
-/// Factor by which the prediction error has to be smaller at the end of a search from a rival with more values: a law that holds the other within it always fits a
-/// little better.
+/// Factor by which the prediction error has to be smaller at the end of a search from a rival with more values: a law that holds the other within it
+/// always fits a little better.
 const RICHER: f64 = 0.9;
 
 /// A candidate that, beside the other causes, does better than the cause that was added in its place.
@@ -47,8 +48,9 @@ struct Rival<const P: usize> {
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// The search that adds a better rival in the place of its cause, if it ends better. Rivals with more values than their cause are tried only once a search has
-    /// `ended`, and those with fewer or as many before: what more values explain may still be the doing of another cause.
+    /// The search that adds a better rival in the place of its cause, if that search ends with a smaller error. Rivals with more values than their
+    /// cause are tried only once a search has `ended`, and those with fewer or as many before: what more values explain may still be due to another
+    /// cause.
     pub(crate) fn reconsidered(
         &self,
         search: &ModelSearch<N, P>,

@@ -1,8 +1,8 @@
 //! Two causes at once: either leaves so much of the gap to the other that neither is accepted alone.
 //!
-//! A cause is judged by the part of the gap it removes. Of two causes of the same size each removes a half of the gap at most, and if the windows weigh by the
-//! worse of the two, much less. So before a search ends with an open gap, each of the best candidates is accepted on trial: if another then closes nearly all of
-//! the gap, and neither can be spared, both are causes.
+//! A cause is judged by the part of the gap it removes. Of two causes of the same size each removes a half of the gap at most, and if the windows
+//! weigh by the worse of the two, much less. So before a search ends with an open gap, each of the best candidates is accepted on trial: if another
+//! then closes nearly all of the gap, and neither can be spared, both are causes.
 
 use crate::likelihood::context::DiagnosisContext;
 use crate::likelihood::solve::Effort;
@@ -21,8 +21,8 @@ const FORESEEN: f64 = 0.3;
 /// Candidates that are accepted on trial, as the first of two causes.
 const TRIED: usize = 3;
 
-/// Mean advantage per window, in standard errors, below which a candidate is not tried as one of two causes, unless it brings implausible parameters back to their
-/// prior values.
+/// Mean advantage per window, in standard errors, below which a candidate is not tried as one of two causes, unless it brings implausible parameters
+/// back to their prior values.
 const HOPEFUL: f64 = 1.5;
 
 /// Two causes, and the search node at which the second was found.

@@ -1,62 +1,71 @@
-//! Constants that decide in the diagnosis of a serial arm, each with its unit, its reason, and what other values did.
+//! Constants that decide in the diagnosis of a serial arm, each with its unit and reason. A term is an addition to the nominal model: an effect on a
+//! joint, a payload, a tilt of the base, or a changed link, transmission or controller setting.
 
-/// Robust test statistic (squared, sandwich over blocks) that a term needs on training logs and holdout together: five standard deviations on the training logs,
-/// which one of 300 candidates exceeds by chance once in 6,000 searches, and three on the holdout. A stop may be met in the holdout only.
+/// Squared test statistic (estimated size over its standard deviation, robust to correlated residuals) above which a term of the model is
+/// significant, summed over training logs and holdout: five standard deviations on the training logs, which one of 300 candidates exceeds by chance
+/// once in 6,000 searches, and three on the holdout. The sum also accepts an effect that acts mostly in the holdout, such as a joint limit.
 pub const SIGNIFICANT: f64 = 34.0;
 
-/// Robust test statistic (squared) that a term needs on the training logs alone: three standard deviations.
+/// Squared test statistic (estimated size over its standard deviation, robust to correlated residuals) that a term of the model needs on the training
+/// logs alone: three standard deviations.
 pub const NOTICED: f64 = 9.0;
 
-/// Decrease of the training cost, per parameter of a term, from which the term is accepted: twice the logarithm of some hundred candidates.
+/// Decrease of the training cost (weighted squared residuals), per parameter of a term of the model, from which the term is accepted: twice the
+/// logarithm of some 400 candidates.
 pub const PRICE: f64 = 12.0;
 
-/// Standard deviations by which the size of a term on the holdout has to differ from zero: one false term in 700 passes by chance, after the training logs let it
-/// pass.
+/// Standard deviations by which the size of a term of the model on the holdout has to exceed zero: one of 700 false terms that the training logs
+/// accept passes by chance.
 pub const HOLDOUT_DEVIATIONS: f64 = 3.0;
 
-/// Share of the residual squares of one joint's holdout rows that a term has to explain.
+/// Share, 0 to 1, of one joint's squared holdout residuals that a term of the model has to explain to be accepted.
 pub const MATTERS: f64 = 0.1;
 
-/// RMS torque of a term, relative to the torque of the joint it acts on most, below which the term makes no difference to anyone.
+/// RMS torque of a term of the model, relative to the RMS torque of the joint it acts on most, below which the term is too small to matter.
 pub const CONSEQUENCE: f64 = 0.005;
 
-/// Decrease of the squared distance from the arm file's values above which a term that only restores these values is accepted, besides `RESTORES_EACH` for every
-/// parameter of the term. Values as far off as their standard deviations say give a load of four parameters more than the sum once in 2,000 logs.
+/// Decrease of the parameters' squared distance from the arm file's values, counted in standard deviations, above which a term that only brings the
+/// parameters back to these values is accepted, besides [`RESTORES_EACH`] for every parameter of the term. Where the arm file's values are as
+/// uncertain as their standard deviations say, a payload of four parameters exceeds the sum by chance once in 2,000 logs.
 pub const RESTORES: f64 = 14.0;
 
-/// Further decrease of the squared distance from the arm file's values per parameter of a term that only restores these values, see [`RESTORES`].
+/// Further decrease of the parameters' squared distance from the arm file's values, per parameter of a term that only brings the parameters back to
+/// these values, see [`RESTORES`].
 pub const RESTORES_EACH: f64 = 1.5;
 
-/// Standard deviations of the arm file within which a term that replaces values of a link keeps what motion does not determine of them.
+/// Prior standard deviation of a changed link's inertial parameters, as a multiple of the arm file's: loose, and yet enough to hold the parameters
+/// that motion does not determine near the arm file's values.
 pub const LOOSE: f64 = 10.0;
 
-/// Two models whose costs differ by less than this part of the cost that the term explains, or by less than `ALIKE_COST`, are look-alikes.
+/// Share of the cost that a term of the model explains: a rival term whose model costs no more than this share above the cost with the term, or no
+/// more than [`ALIKE_COST`], is a look-alike.
 pub const ALIKE: f64 = 0.05;
 
-/// Difference of costs below which two models are look-alikes, see [`ALIKE`]: two standard deviations squared.
+/// Difference of the costs (weighted squared residuals) of two models below which their terms are look-alikes, see [`ALIKE`]: two standard deviations
+/// squared.
 pub const ALIKE_COST: f64 = 4.0;
 
-/// Candidates that are fitted after all candidates were tested to first order.
+/// Number of candidate terms, the best by first-order tests, that are fitted in each step of the model search.
 pub const FINALISTS: usize = 8;
 
-/// Iterations of a fit at most; with twelve the answers are the same.
+/// Largest number of Gauss-Newton iterations in which the parameters of a model's terms are fitted; with twelve the diagnoses are the same.
 pub const ITERATIONS: usize = 6;
 
-/// Relative decrease of the cost below which a fit ends, see [`ITERATIONS`].
+/// Relative decrease of the cost in one iteration below which the fit of a model's terms ends, see [`ITERATIONS`].
 pub const ENOUGH: f64 = 1e-3;
 
-/// Resamples of the blocks from which a probability is taken.
+/// Number of bootstrap resamples of the one-second blocks of the logs from which the probability of a cause is taken.
 pub const RESAMPLES: usize = 400;
 
-/// Share of the moving joints on which a law has to be found to be one cause of the whole arm.
+/// Share, 0 to 1, of the moving joints on which a law has to be significant to be reported as one cause of the whole arm.
 pub const ARM_WIDE: f64 = 0.5;
 
-/// Laws that are tried on all joints at once, of those that explain most to first order.
+/// Number of laws that are fitted to all joints at once in one step of the model search: those that explain most to first order.
 pub const ARM_WIDE_FINALISTS: usize = 2;
 
-/// Probability below which a cause is only a candidate.
+/// Probability below which a cause is reported as a mere candidate and not named.
 pub const NAMED: f64 = 0.3;
 
-/// Smallest eigenvalue of the inertia matrix, scaled to unit diagonal, relative to the same of the arm file, below which rollouts answer to torques as no arm
-/// does.
+/// Smallest eigenvalue of the inertia matrix, scaled to unit diagonal, relative to that with the arm file's parameters, below which parameters are
+/// not used for simulation: no real arm has such an inertia matrix.
 pub const CONDITIONED: f64 = 0.2;

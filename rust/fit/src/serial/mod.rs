@@ -1,9 +1,10 @@
 //! Diagnosis of serial arms of one to seven joints.
 //!
-//! A serial arm has dozens of parameters and hundreds of candidate effects, and its torques are mostly those of a controller or of measured currents: not an input
-//! that is independent of what the model lacks. So missing terms are sought in the equation of motion along the measured path, in its weak form, where all
-//! parameters and most terms are linear and no rollout is needed; predictions over short windows only say how far the gap shrinks. The data go through `weak_form`
-//! (intervals of a log, torques of terms, rows of the regression) -> `search` (which terms) -> `predict` (gap) -> `result`.
+//! A serial arm has dozens of parameters and hundreds of candidate effects. Its torques are mostly those of a controller or of measured currents, and
+//! so are not an input that is independent of the model's errors. Missing terms are therefore sought by regression in the weak form of the equation
+//! of motion along the measured path, where all parameters and most terms are linear and no simulation is needed; predictions over short windows only
+//! say how far the gap shrinks. The data go through `weak_form` (intervals of a log, torques of terms, rows of the regression) -> `search` (which
+//! terms) -> `predict` (gap) -> `result`.
 
 mod constants;
 pub mod controller;
@@ -38,26 +39,27 @@ use weak_form::rows::{Prior, Rows, Signal};
 /// A serial arm as an arm file describes it.
 #[derive(Debug, Clone)]
 pub struct SerialArm {
-    /// Joints of the arm, one to seven, and gravity.
+    /// Kinematic chain of the arm: one to seven joints, and gravity.
     pub chain: ChainDescription,
-    /// Parameters of the arm, SI, thirteen per joint: ten of each link, then rotor inertias, viscous and Coulomb coefficients.
+    /// Parameters of the arm, SI, 13 per joint: ten inertial parameters of each link, link by link, then rotor inertias, viscous and Coulomb
+    /// coefficients of all joints.
     pub theta: Vec<f64>,
-    /// Standard deviations of the arm's parameters, SI; zero for a value that is not estimated.
+    /// Standard deviations of the arm's parameters, SI, in the order of the parameters; zero for a value that is not estimated.
     pub sigma: Vec<f64>,
-    /// Smallest step of each position measurement, rad or m; none where unknown.
+    /// Encoder step of each joint, rad or m; none where unknown.
     pub steps: Option<Vec<f64>>,
-    /// Position controller of the arm, for logs that hold references in place of torques.
+    /// Position controllers of the arm's joints, for logs that hold references in place of torques.
     pub controller: Option<PositionController>,
 }
 
 impl SerialArm {
-    /// Whether each joint is revolute.
+    /// Whether each joint is revolute (rad, N m); else it is prismatic (m, N).
     pub fn rotary(&self) -> Vec<bool> {
         self.chain.joints.iter().map(|j| j.kind == JointKind::Revolute).collect()
     }
 }
 
-/// Arguments of a diagnosis of a serial arm.
+/// Arguments of [`diagnose`] for a serial arm.
 struct Request<'a> {
     arm: &'a SerialArm,
     training: &'a [LogData<'a>],
@@ -66,11 +68,11 @@ struct Request<'a> {
     observer: &'a Observer,
 }
 
-/// Diagnoses the gap between a serial arm and its logs; `observer` is told the progress and may cancel.
+/// Diagnoses the gap between a serial arm's model and its `training` and `holdout` logs; `observer` receives the progress and may cancel.
 ///
 /// # Errors
 ///
-/// Logs or options that a diagnosis cannot work with.
+/// Logs or options that a diagnosis cannot work with, and [`DiagnoseError::Stopped`] where `observer` cancels.
 pub fn diagnose(
     arm: &SerialArm,
     training: &[LogData<'_>],
@@ -83,7 +85,7 @@ pub fn diagnose(
     guarded(|| by_size(&request)).ok_or(DiagnoseError::Stopped)?
 }
 
-/// Runs the diagnosis with the number of joints known at compile time.
+/// Runs the diagnosis of a serial arm with the number of joints known at compile time.
 fn by_size(request: &Request<'_>) -> Result<Diagnosis, DiagnoseError> {
     match request.arm.chain.joints.len() {
         1 => request.run::<1, 13>(),
@@ -150,7 +152,7 @@ impl Request<'_> {
             |values: &[f64]| training.equation.conditioning(&std::array::from_fn(|i| values[i])) > least;
         let mut candidates = candidates(&arm, &theta, &training.data.tracks, self.options.known_units);
         if let Some(controller) = &controller {
-            // Their torque is known as the noise of the positions leaves it, and so is no deflection.
+            // The noise of the positions limits what is known of a controller's torque, and with it of a deflection.
             candidates.retain(|group| !matches!(group[0].kind, TermKind::Transmission(_)));
             let inertia = training.equation.mean_inertia(&theta);
             let period = training.data.tracks.first().map_or(0.0, Track::period);
@@ -174,7 +176,7 @@ impl Request<'_> {
         Ok(diagnosis)
     }
 
-    /// Prior of the arm's parameters, and of those gains of the controller that are estimated, as differences from the arm file's gains.
+    /// Prior of the regression: the arm's parameters, then the controllers' estimated gains as differences from the arm file's gains, zero a priori.
     fn prior<const P: usize>(&self, theta: &[f64; P], controller: Option<&PositionController>) -> Prior {
         let gains: Vec<f64> = controller.map_or_else(Vec::new, |controller| {
             controller.estimated().into_iter().map(|(gain, j)| controller.sigma[gain][j]).collect()
@@ -218,7 +220,8 @@ impl Request<'_> {
     }
 }
 
-/// Settings of the controllers that may differ from the arm file's, at their initial guesses, grouped by setting and joint.
+/// Candidate terms for controller settings that differ from the arm file's, at their initial guesses, grouped by setting and joint; `inertia` is each
+/// joint's mean inertia, kg m^2 or kg, and `period` the logs' sample period, s.
 fn controller_settings(controller: &PositionController, inertia: &[f64], period: f64) -> Vec<Vec<Term>> {
     let group = |setting: Setting, joint: usize| {
         let guesses = setting.guesses(&controller.joints[joint], inertia[joint], period);
@@ -229,14 +232,15 @@ fn controller_settings(controller: &PositionController, inertia: &[f64], period:
     all.map(|(setting, joint)| group(setting, joint)).collect()
 }
 
-/// Half cycles of a torque ripple over a joint's travel at most.
+/// Largest number of half cycles of a torque ripple over the travel of a joint.
 const HALF_CYCLES: usize = 80;
 
-/// Torques within which a link crosses its backlash, relative to the joint's RMS torque.
+/// Transmitted torques around zero within which a link crosses its backlash, relative to the joint's RMS torque.
 const CROSSINGS: [f64; 2] = [0.03, 0.15];
 
-/// Every candidate term at each of its initial guesses, grouped by effect and joint. Effects with latent states between motor and link, and those stated for arms
-/// in a plane, are not among them.
+/// Every candidate term of an arm without controllers, at each of its initial guesses, grouped by effect and joint. Left out are effects of the
+/// library that simulate a motor beside its link (the weak form has terms of its own for transmissions), pushes, and effects on the whole arm, which
+/// are stated for arms in a plane.
 fn candidates<const N: usize, const P: usize>(
     arm: &Chain<f64, N>,
     theta: &[f64; P],
@@ -256,7 +260,7 @@ fn candidates<const N: usize, const P: usize>(
         if effect.law.inertia(&effect.p) > 0.0 && theta[10 * N + effect.joint] > 0.0 {
             continue;
         }
-        // Both phases are tested together, at as many cycles over the travel as test functions pass.
+        // Sine and cosine of a ripple are tested together, for as many cycles over the travel as the test functions let through.
         if effect.is_periodic() {
             if !groups.iter().any(|group| group[0].same_place(&Term::of_law(effect))) {
                 let cycles = scales.size(Quantity::Cycles, effect.joint);

@@ -9,7 +9,7 @@ use armgap_core::arm::Arm;
 use armgap_core::chain::Chain;
 use nalgebra::SVector;
 
-/// A serial arm with parameters and terms in the form that the integrator takes.
+/// Model of a serial arm for simulation: the chain, its parameters and effects, position controllers, and terms on coupled joints.
 pub struct Model<const N: usize, const P: usize> {
     arm: Chain<f64, N>,
     hypothesis: Hypothesis<P>,
@@ -18,7 +18,7 @@ pub struct Model<const N: usize, const P: usize> {
 }
 
 impl<const N: usize, const P: usize> Model<N, P> {
-    /// The serial arm with parameters `theta` and the terms added.
+    /// Model of the serial arm with parameters `theta`, SI, and with `terms` added.
     pub fn new(arm: &Chain<f64, N>, theta: [f64; P], terms: &[Term]) -> Self {
         let mut model =
             Self { arm: *arm, hypothesis: Hypothesis::rigid(theta), closed_loop: None, rows: Vec::new() };
@@ -36,14 +36,14 @@ impl<const N: usize, const P: usize> Model<N, P> {
                 }
                 TermKind::BaseTilt => model.arm = turned(&model.arm, [term.p[0], term.p[1]]),
                 TermKind::Row(row) => model.rows.push((row, term.p)),
-                // A part of the closed loop; members of what is on several joints.
+                // Controllers are in the closed loop, and the members of a term on several joints are visited one by one.
                 TermKind::Controller(_) | TermKind::Joints(_) => {}
             }
         }
         model
     }
 
-    /// The model with position controllers (`closed_loop`) in place of logged torques.
+    /// The model with its torques from position controllers (`closed_loop`), if there are any, in place of logged torques.
     pub fn behind(self, closed_loop: Option<ClosedLoop<N>>) -> Self {
         Self { closed_loop, ..self }
     }
@@ -54,7 +54,7 @@ impl<const N: usize, const P: usize> Model<N, P> {
         }
     }
 
-    /// Predicted positions of all windows, sample by sample and joint by joint, rad or m.
+    /// Predicted positions of all windows of `data`, rad or m, sample by sample and joint by joint.
     pub fn predict(&self, data: &Dataset<N>) -> Vec<f64> {
         if !self.rows.is_empty() {
             let tracks = data.tracks.iter().map(|track| without_rows(track, &self.rows)).collect();
@@ -72,7 +72,8 @@ impl<const N: usize, const P: usize> Model<N, P> {
     }
 }
 
-/// The arm with its base turned by the rotation vector `by`, rad, about the horizontal axes of the base frame: gravity turns the other way.
+/// The arm with its base turned by `by`, the x and y components, rad, of a rotation vector in the base frame; in the base frame gravity turns the
+/// other way.
 pub fn turned<const N: usize>(arm: &Chain<f64, N>, by: [f64; 2]) -> Chain<f64, N> {
     let g = *arm.gravity_vector();
     let angle = by[0].hypot(by[1]);
@@ -89,8 +90,8 @@ pub fn turned<const N: usize>(arm: &Chain<f64, N>, by: [f64; 2]) -> Chain<f64, N
     }))
 }
 
-/// Noise floor: mean square position error of a perfect model by joint, rad^2 or m^2, from noise of the samples and errors of the measured initial states carried
-/// along the windows.
+/// Noise floor by joint, rad^2 or m^2: mean square position error of a perfect model over the windows of `data`, from the `noise` of the samples
+/// (standard deviation, rad or m) and the errors of the measured initial states, carried along the windows.
 pub fn floor<const N: usize>(data: &Dataset<N>, noise: &[f64; N]) -> [f64; N] {
     let square = |w: &Window<N>, j: usize| -> f64 {
         let track = &data.tracks[w.track];

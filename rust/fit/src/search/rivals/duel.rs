@@ -1,8 +1,8 @@
 //! Comparison of two effects that explain about the same, each under window weights made around it.
 //!
-//! Windows are weighed, and their initial states fitted, around the best candidate. This favours it: an initial state that had to be moved far for the best
-//! candidate is weighted less from then on, and lets the rival's advantage in that window pass. Of two candidates that are close, each is therefore judged under
-//! weights made around either, and the weights under which the winner leads more clearly decide.
+//! Windows are weighed, and their initial states fitted, around the best candidate. This favours the best candidate: an initial state that had to be
+//! moved far for it is known less well from then on, and can take up the error that the rival would explain in that window. Of two candidates that
+//! are close, each is therefore judged under weights made around either, and the weights under which the winner leads more clearly decide.
 
 use crate::likelihood::context::DiagnosisContext;
 use crate::likelihood::solve::Effort;

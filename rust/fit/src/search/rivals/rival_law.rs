@@ -1,7 +1,7 @@
-//! The rival of every named cause: a torque without a name, as a table over the variable that predicts best what the arm lacks without the cause.
+//! The rival of every named cause: an unnamed torque, as a table over the variable that predicts best what the arm lacks without the cause.
 //!
-//! An effect that is not in the arm is named where it imitates the missing torque better than the other effects do. A table has no form of its own to imitate
-//! with: where it explains much more of the holdout than the named effect, the form of the named effect is wrong.
+//! An effect that is not in the arm is named where it imitates the missing torque better than the other effects do. A table has no form of its own to
+//! imitate with: where it explains much more of the holdout than the named effect, the form of the named effect is wrong.
 
 use crate::likelihood::context::{DiagnosisContext, SplitWeighting, WindowSet};
 use crate::likelihood::solve::{Effort, Fit};
@@ -16,8 +16,8 @@ use armgap_core::arm::Arm;
 use nalgebra::SVector;
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// Variables that the torques missing in a model depend on, strongest first: tables fitted to the training logs that predict the holdout, each beside the
-    /// model with everything fitted again.
+    /// Variables that the torques missing in a model depend on, strongest first: tables fitted to the training logs that predict the holdout, each
+    /// beside the model with everything fitted again.
     pub(crate) fn laws_beside(
         &self,
         model: &Fit<P>,
@@ -44,7 +44,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         dependences(&self.arm, &model.theta, &self.prior.sigma, &logs, wanted)
     }
 
-    /// Holdout cost of a model with the best table of torque without a name added; none where no table predicts what the model lacks.
+    /// Holdout cost of a model with the best table of an unnamed torque added; none where no table predicts what the model lacks.
     pub(crate) fn rival_cost(&self, model: &Hypothesis<P>, weights: &SplitWeighting<N>) -> Option<f64> {
         let rival = self.dependences(model, Wanted { most: 1, rotary: true }).into_iter().next()?;
         Some(self.cost_beside(model, &rival, weights))

@@ -1,8 +1,9 @@
-//! Predictions of an arm behind position controllers: they act on the predicted motion, under the logged reference.
+//! Predictions of an arm behind position controllers, in closed loop: the controllers act on the predicted motion, under the logged reference.
 //!
-//! Within a sample interval the controllers run at a period of a millisecond or less and hold their torque over it, that of the state expected in its
-//! middle: a torque of the state at its start would be late by half a period, which at a stiff gain is a force along the velocity. Effects that change what a
-//! command becomes are given the torques of the last periods, before a window's start those along the measured path.
+//! Within a sample interval the controllers run at a period of a millisecond or less and hold their torque over the period. The torque is that of the
+//! state expected in the middle of the period: with the state at the start, the torque would be late by half a period, which at a stiff gain feeds
+//! energy into the motion. Effects of the drive (delay, lag, saturation) need the commanded torques of the last periods; before the start of a window
+//! these are the controllers' torques along the measured path.
 
 use crate::model::hypothesis::{EffectInstance, Hypothesis};
 use crate::predict::window::{DIVERGED, Dataset, Window};
@@ -15,45 +16,45 @@ use armgap_core::transmission::Sides;
 use nalgebra::{SMatrix, SVector};
 use rayon::prelude::*;
 
-/// Longest period of a controller, s.
+/// Longest period of a simulated position controller, s.
 const PERIOD: f64 = 1e-3;
 
-/// Part of the controller's own time constant that a period may take.
+/// Period of a simulated position controller, at most, relative to the time constant of its closed loop.
 const RESOLVED: f64 = 0.2;
 
-/// Periods in a sample interval at most.
+/// Largest number of controller periods in one sample interval.
 const MOST_PERIODS: usize = 100;
 
-/// Part of a period by which an interval may be longer than a whole number of them: times are rounded.
+/// Part of a controller period by which a sample interval may exceed a whole number of periods without a further one: sample times are rounded.
 const ROUNDING: f64 = 1e-6;
 
-/// Time constants of a lag after which it has forgotten.
+/// Number of time constants after which a lag has forgotten its input.
 const FORGOTTEN: f64 = 8.0;
 
-/// Position controllers in closed loop with an arm.
+/// Position controllers in closed loop with a simulated arm.
 #[derive(Debug, Clone)]
 pub struct ClosedLoop<const N: usize> {
-    /// The controllers.
+    /// Position controllers by joint.
     pub joints: Vec<JointController>,
-    /// Torque that the integral part of each held when a log began, log by log.
+    /// Torque of each integral part at the start of each log, N m or N, by log and joint.
     pub held_before: Vec<[f64; N]>,
 }
 
-/// One joint's controller along a log.
+/// Position controller of one joint with its inputs along a log.
 struct Servo {
     controller: JointController,
     reference: Vec<InputSegment<f64>>,
     rate: Vec<InputSegment<f64>>,
     integral: Vec<InputSegment<f64>>,
-    /// Prompt torque along the measured path.
+    /// Torque along the measured path before its delay, N m or N, by sample interval.
     measured: Vec<InputSegment<f64>>,
-    /// Laws that the command passes, the controller's own delay first.
+    /// Effects of the drive on the commanded torque (delay, lag, saturation), the controller's own delay first.
     laws: Vec<EffectInstance>,
-    /// Time for which they remember it, s.
+    /// Time for which the effects of the drive remember commanded torques, s.
     memory: f64,
 }
 
-/// Torques of the last periods of one joint, each with the time it began at.
+/// Commanded torques of one joint in the last controller periods, N m or N, each with the time, s, at which its period began.
 #[derive(Default)]
 struct Past {
     t: Vec<f64>,
@@ -97,14 +98,15 @@ impl Servo {
         }
     }
 
-    /// Torques before sample `first` that the laws remember.
+    /// Commanded torques before sample `first` that the effects of the drive still remember.
     fn past(&self, t: &[f64], first: usize) -> Past {
         let begin = t[..first].partition_point(|at| *at < t[first] - self.memory).saturating_sub(1);
         let begin = if self.memory > 0.0 { begin } else { first };
         Past { t: t[begin..first].to_vec(), torque: self.measured[begin..first].to_vec() }
     }
 
-    /// Torque that the drive delivers, by its laws of delay, lag and saturation, where the controller commands `torque` at `now` and holds it for `period`.
+    /// Torque that the drive delivers, after delay, lag and saturation, N m or N, where the controller commands `torque` at time `now`, s, and holds
+    /// it for `period`, s.
     fn delivered(&self, past: &mut Past, now: f64, period: f64, torque: f64) -> InputSegment<f64> {
         if self.laws.is_empty() {
             return InputSegment::held(torque);
@@ -127,7 +129,7 @@ impl Servo {
 }
 
 impl<const N: usize> ClosedLoop<N> {
-    /// Predicted positions of all windows, each from its measured initial state; tracks without a reference diverge.
+    /// Predicted positions of all windows, rad or m, each from its measured initial state; windows of logs without a reference count as diverged.
     pub fn predict<A: Arm<f64, N, P>, const P: usize>(
         &self,
         data: &Dataset<N>,
@@ -161,7 +163,7 @@ impl<const N: usize> ClosedLoop<N> {
     }
 }
 
-/// Simulates one window.
+/// Simulates one window of a log and writes the predicted positions, rad or m, sample by sample and joint by joint, into `positions`.
 fn run<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     plant: &Plant<f64, A, N, P>,
     hypothesis: &Hypothesis<P>,
@@ -205,7 +207,7 @@ fn run<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     }
 }
 
-/// Position and velocity that joint `j`'s encoder shows.
+/// Position, rad or m, and velocity that the encoder of joint `j` shows in a simulated state.
 fn shown<const N: usize, const P: usize>(
     hypothesis: &Hypothesis<P>,
     state: &State<f64, N>,
@@ -215,7 +217,8 @@ fn shown<const N: usize, const P: usize>(
     if hypothesis.distorts() { (hypothesis.measured(j, q), dq * hypothesis.stretch(j, q)) } else { (q, dq) }
 }
 
-/// Periods of the controllers in an interval of length `h`: short beside what they and viscous friction do to the joints.
+/// Number of controller periods in a sample interval of length `h`, s: a period is short beside the time constants of the closed loop and of viscous
+/// friction.
 fn periods<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     plant: &Plant<f64, A, N, P>,
     servos: &[Servo],
@@ -253,15 +256,16 @@ mod tests {
         speed_limit: f64::INFINITY,
         torque_limit: f64::INFINITY,
     };
-    /// Position by which periods of a servo of one millisecond and steps of 20 microseconds differ, after a step of the reference of 0.1 rad.
+    /// Largest difference of positions, rad, between servos with periods of one millisecond and of 20 microseconds, after a step of the reference of
+    /// 0.1 rad.
     const STEPPED: f64 = 1e-4;
 
-    /// The reference steps from 0 to 0.1 rad after a fifth of a second, from rest.
+    /// Reference at sample `k`, rad: a step from 0 to 0.1 after a fifth of a second.
     fn target(k: usize) -> f64 {
         if k < 40 { 0.0 } else { 0.1 }
     }
 
-    /// A pendulum without gravity that is at rest in its log: it is predicted, and not compared.
+    /// Predicted positions, rad, of a pendulum without gravity behind `servo`; its log is at rest and gives the initial state alone.
     fn predicted(servo: JointController, effects: Vec<EffectInstance>) -> Vec<f64> {
         let count = 160;
         let t: Vec<f64> = (0..count).map(|k| PERIOD * k as f64).collect();
@@ -273,7 +277,7 @@ mod tests {
         closed_loop.predict(&data, &Pendulum { gravity: 0.0 }, &hypothesis)
     }
 
-    /// The same by explicit Euler steps; `torque` makes the delivered torque of those asked for so far.
+    /// Positions, rad, of a pendulum behind `servo` by explicit Euler steps; `torque` returns the delivered torque from the torques commanded so far.
     fn stepped(servo: &JointController, torque: impl Fn(&[f64]) -> f64) -> Vec<f64> {
         let steps = 250;
         let dt = PERIOD / f64::from(steps);

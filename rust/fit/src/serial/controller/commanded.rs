@@ -1,9 +1,9 @@
-//! The weak equation of motion of an arm behind position controllers: their torque along the measured path, what their settings change in it, and
-//! estimated gains as further parameters.
+//! Weak form of the equation of motion for an arm behind position controllers: their torque along the measured path, the change of this torque by
+//! changed controller settings, and estimated gains as further parameters of the regression.
 //!
-//! With `tau = kp e + kd de + ki int e dt` and gains that are `d` more than the arm file has, `tau(nominal) = psi theta - d e`: one column per
-//! gain beside the arm's. What an integral part held before the log began is a constant torque that no log tells from an offset, so that the mean over
-//! each log is left out of the rows of such a joint.
+//! With `tau = kp e + kd de + ki int e dt` and gains that are `d` more than the arm file has, `tau(nominal) = psi theta - d e`: the regressor has one
+//! more column for each estimated gain. The integral of the error up to the start of the log is unknown and makes a constant torque, which no log
+//! tells from an offset. So rows of a joint with an integral part are taken less their mean over each log.
 
 use crate::log::track::Track;
 use crate::serial::controller::{Given, JointController, PositionController};
@@ -13,21 +13,21 @@ use crate::serial::weak_form::equation::{Equation, Torques};
 use crate::serial::weak_form::rows::{Signal, sum};
 use armgap_core::effect::InputSegment;
 
-/// Position controllers along logs.
+/// Position controllers and their inputs along logs.
 #[derive(Debug, Clone)]
 pub struct Commanded<const N: usize> {
-    /// The controllers.
+    /// Position controllers by joint.
     pub controller: PositionController,
-    /// What they are given, log by log.
+    /// Reference and measured path of each joint's controller, log by log.
     pub given: Vec<[Given; N]>,
-    /// Means of torque and regressor over each log, by log and joint, of joints with an integral part.
+    /// Means of torque and regressor over the rows of each log, by log and joint; none for joints without an integral part.
     levels: Vec<Vec<Option<Level>>>,
 }
 
 /// Means of torque and regressor over the rows of one joint in one log.
 type Level = (f64, Vec<f64>);
 
-/// Torques of a controller along a track's measured path, in place of logged ones; none for a track without a reference.
+/// Torques of the controllers along a log's measured path, N m or N, by sample interval and joint; none for a log without a reference.
 pub fn torques<const N: usize>(
     controller: &PositionController,
     track: &Track<N>,
@@ -37,13 +37,13 @@ pub fn torques<const N: usize>(
     Some((0..track.len()).map(|k| std::array::from_fn(|j| columns[j][k])).collect())
 }
 
-/// What the controllers are given along a track; none for a track without a reference.
+/// Reference and measured path of each joint's controller along a log; none for a log without a reference.
 pub fn given<const N: usize>(track: &Track<N>) -> Option<[Given; N]> {
     (0..N).map(|j| Given::new(track, j)).collect::<Option<Vec<_>>>()?.try_into().ok()
 }
 
 impl<const N: usize, const P: usize> Equation<N, P> {
-    /// The equation with the controllers behind its torques; without a reference in every log, as it is.
+    /// The equation with its torques from `controller` and estimated gains as further parameters; unchanged if any log is without a reference.
     pub fn behind(mut self, controller: &PositionController, tracks: &[Track<N>]) -> Self {
         let Some(given) = tracks.iter().map(given).collect::<Option<Vec<_>>>() else { return self };
         self.commanded = Some(Commanded { controller: controller.clone(), given, levels: Vec::new() });
@@ -55,7 +55,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         self
     }
 
-    /// Adds a column to the regressor for every gain that is estimated.
+    /// Adds one column to the regressor for every estimated gain of the controllers.
     fn append_gains(&mut self) {
         let Some(commanded) = &self.commanded else { return };
         let columns: Vec<Signal> = commanded
@@ -84,7 +84,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         self.rows.parameters += columns.len();
     }
 
-    /// Lets the floor of joint `j`'s rows hold what the noise of its position puts into them through the controller too.
+    /// Raises the noise floor of joint `j`'s rows to what the position noise adds through the controller's `kp` and `kd`.
     fn floor_behind(&mut self, j: usize, controller: &JointController) {
         let [kp, kd, _] = controller.gains;
         for (row, i) in self.kept[j].iter().enumerate() {
@@ -95,13 +95,13 @@ impl<const N: usize, const P: usize> Equation<N, P> {
             };
             let momentum = square([1.0, 0.0, 0.0]);
             let floor = &mut self.rows.joints[j].floor[row];
-            // Of what the floor holds already the joint's own inertia is the most; its sign beside the controller's decides little.
+            // The joint's own inertia makes most of the floor so far; its sign beside the controller's gains matters little.
             let inertia = *floor / (log.noise[j] * momentum.sqrt()).max(f64::MIN_POSITIVE);
             *floor = floor.max(log.noise[j] * square([inertia, kp, kd]).sqrt());
         }
     }
 
-    /// Leaves the mean over each log out of the rows of joints with an integral part, and keeps it.
+    /// Subtracts the mean over each log from the rows of joints with an integral part, and stores the means.
     fn leave_out_means(&mut self) {
         let columns = self.rows.parameters;
         let mut levels = vec![vec![None; N]; self.logs.len()];
@@ -134,7 +134,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         self.commanded.as_ref().is_some_and(|commanded| commanded.controller.integrates(j))
     }
 
-    /// Rows of joint `j`, log by log.
+    /// Indices of the rows of joint `j`, log by log.
     fn rows_by_log(&self, j: usize) -> Vec<Vec<usize>> {
         let mut by_log = vec![Vec::new(); self.logs.len()];
         for (row, i) in self.kept[j].iter().enumerate() {
@@ -143,7 +143,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         by_log
     }
 
-    /// Leaves the mean over each log out of values of joint `j`'s rows, if it has an integral part.
+    /// Subtracts the mean over each log from `values`, one for each row of joint `j`; nothing for a joint without an integral part.
     pub(in crate::serial) fn centre(&self, j: usize, values: &mut [f64]) {
         if !self.integrates(j) {
             return;
@@ -156,7 +156,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         }
     }
 
-    /// What a controller's setting takes from the nominal torque.
+    /// Nominal torque minus the torque with a controller's setting changed by `value`, N m or N, by joint and row of the weak form.
     pub(in crate::serial) fn of_controller(&self, term: ControllerTerm, value: f64) -> Signal {
         let Some(commanded) = &self.commanded else { return vec![None; N] };
         let j = term.joint;
@@ -171,7 +171,8 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         self.weak(&torques)
     }
 
-    /// Torque, by log and joint, that the integral part of a controller held when the log began, beside these parameters and terms.
+    /// Torque of each integral part at the start of each log, N m or N, by log and joint: the mean torque that the arm with parameters `theta` and
+    /// `terms` needs and the controller's proportional and derivative parts do not give; zero for joints without an integral part.
     pub fn held_before(&self, theta: &[f64], terms: &[Term]) -> Vec<[f64; N]> {
         let mut held = vec![[0.0; N]; self.logs.len()];
         let Some(commanded) = &self.commanded else { return held };
@@ -204,12 +205,12 @@ mod tests {
     const PERIOD: f64 = 0.004;
     const INERTIA: f64 = 0.7;
     const VISCOUS: f64 = 0.9;
-    /// Torque that the joint needs beside these, as of an offset, N m.
+    /// Constant torque that the joint needs on top of those of inertia and friction, N m.
     const OFFSET: f64 = 1.3;
     /// Largest error of torques of some 8 N m computed from a log by test functions, local cubics and references that are straight between rows, N m.
     const MET: f64 = 0.02;
 
-    /// One joint about the vertical, its inertial parameter and viscous friction known.
+    /// One joint about the vertical, with a known moment of inertia and viscous friction.
     fn arm() -> (Chain<f64, 1>, [f64; 13]) {
         let joint = ChainJoint {
             kind: JointKind::Revolute,

@@ -1,12 +1,13 @@
-//! The position controller of logs that hold references in place of torques, along a measured path.
+//! Torque of a position controller along the measured path, for logs that hold references in place of torques.
 //!
 //! ```text
 //! tau = clip(kp e + kd de + ki int e dt),  e = q_ref - q,  de = -dq  or  dq_ref - dq
 //! ```
 //!
-//! A servo runs much faster than it is logged: its reference is held from row to row, or follows that at a limited speed, while position and
-//! velocity are continuous. So a sample interval has a torque at its start, its middle and its end, with positions and velocities from local
-//! cubics, and the middle from the cubic between the samples (Hermite). What is late is late by the library's delay.
+//! A servo runs much faster than it is logged: its reference is held from row to row, or follows the logged reference at a limited speed, while
+//! position and velocity are continuous. So the torque of a sample interval has three values, at its start, middle and end. Positions and velocities
+//! of the samples come from local cubics, and the position in the middle from the cubic (Hermite) through both samples. Delays of the reference and
+//! of the torque are those of the effect `actuator_delay`.
 
 pub(in crate::serial) mod closed_loop;
 pub(in crate::serial) mod commanded;
@@ -14,36 +15,36 @@ pub(in crate::serial) mod commanded;
 use crate::log::track::Track;
 use armgap_core::effect::{InputSegment, find, interval};
 
-/// A PD or PID controller of every joint; lists by joint, SI.
+/// Position controllers (PD or PID) of all joints.
 #[derive(Debug, Clone)]
 pub struct PositionController {
-    /// Controllers as the arm file has them.
+    /// Controllers by joint, with the settings of the arm file.
     pub joints: Vec<JointController>,
-    /// Standard deviations of `kp`, `kd` and `ki`; zero for a gain that is known.
+    /// Standard deviations of `kp`, `kd` and `ki`, each by joint, in the gains' units; zero for a gain that is not estimated.
     pub sigma: [Vec<f64>; 3],
 }
 
-/// The controller of one joint.
+/// Position controller of one joint: `tau = clip(kp e + kd de + ki int e dt)`, `e = q_ref - q`.
 #[derive(Debug, Clone, Copy)]
 pub struct JointController {
-    /// `kp`, `kd` and `ki`.
+    /// Gains `kp`, N m/rad (N/m), `kd`, N m s/rad (N s/m), and `ki`, N m/(rad s) (N/(m s)).
     pub gains: [f64; 3],
-    /// Whether `kd` acts on the error's rate in place of the measured velocity.
+    /// Whether `kd` acts on the rate of the position error, `dq_ref - dq`; else on the measured velocity, `-dq`.
     pub rate_of_error: bool,
-    /// Time by which the reference arrives late, s.
+    /// Delay of the reference, s.
     pub reference_delay: f64,
-    /// Time by which the torque is late, s.
+    /// Delay of the torque, s.
     pub delay: f64,
-    /// Error up to which the proportional part is zero.
+    /// Position error, rad or m, up to which the proportional part is zero.
     pub deadband: f64,
-    /// Largest speed at which the reference is followed.
+    /// Largest speed at which the reference is followed, rad/s or m/s; infinite for no limit.
     pub speed_limit: f64,
-    /// Largest torque.
+    /// Largest torque in either direction, N m or N; infinite for no limit.
     pub torque_limit: f64,
 }
 
 impl PositionController {
-    /// Gains that are estimated: which of the three, and the joint.
+    /// Gains that are estimated: for each its index among `kp`, `kd` and `ki`, and its 0-based joint.
     pub fn estimated(&self) -> Vec<(usize, usize)> {
         let free = |gain: usize| {
             let sigma = &self.sigma[gain];
@@ -52,7 +53,7 @@ impl PositionController {
         (0..3).flat_map(free).collect()
     }
 
-    /// The controllers with estimated gains, as differences in the order of [`Self::estimated`].
+    /// Controllers by joint with `differences`, in the gains' units, added to the estimated gains, in the order of [`Self::estimated`].
     pub fn with_differences(&self, differences: &[f64]) -> Vec<JointController> {
         let mut joints = self.joints.clone();
         for ((gain, j), difference) in self.estimated().into_iter().zip(differences) {
@@ -61,13 +62,13 @@ impl PositionController {
         joints
     }
 
-    /// Whether joint `j` has an integral part.
+    /// Whether the controller of joint `j` (0-based) has an integral part.
     pub fn integrates(&self, j: usize) -> bool {
         self.joints[j].gains[2] > 0.0
     }
 }
 
-/// What the controller of one joint is given over every sample interval of a log.
+/// Reference and measured path of one joint's controller, over every sample interval of a log.
 #[derive(Debug, Clone)]
 pub struct Given {
     t: Vec<f64>,
@@ -78,7 +79,7 @@ pub struct Given {
 }
 
 impl Given {
-    /// Reference and measured path of joint `j`; none for a log without a reference.
+    /// Reference and measured path of joint `j` (0-based) along a log; none for a log without a reference.
     pub fn new<const N: usize>(track: &Track<N>, j: usize) -> Option<Self> {
         let reference = track.reference.as_ref()?;
         let smoothed = track.smoothed();
@@ -87,7 +88,7 @@ impl Given {
             let h = interval(&track.t, k);
             let (a, b) = (&smoothed[k][j].local, &smoothed[next][j].local);
             let middle = 0.5 * (a.q + b.q) + 0.125 * h * (a.dq - b.dq);
-            // The same mean velocity as viscous friction has in the equation, so that no term can be the difference of the two.
+            // The mean velocity is that of viscous friction in the weak form, so that no term can be the difference of the two.
             let mean = 0.5 * (a.dq + b.dq);
             (
                 InputSegment { start: a.q, middle, end: b.q },
@@ -106,21 +107,22 @@ impl Given {
     }
 }
 
-/// A controller's inputs over the intervals of a log: the error, its rate or the negative velocity, and the error's integral from the first sample.
+/// Inputs of a controller's proportional, derivative and integral part over the sample intervals of a log: position error, rad (m); its rate or the
+/// negative velocity, rad/s (m/s); and integral of the error from the first sample, rad s (m s).
 pub type Errors = [Vec<InputSegment<f64>>; 3];
 
 impl JointController {
-    /// Proportional, derivative and integral input at one instant.
+    /// Input of the proportional part at the position error `error`, rad or m: zero within the deadband.
     pub fn proportional(&self, error: f64) -> f64 {
         if error.abs() > self.deadband { error } else { 0.0 }
     }
 
-    /// Largest torque either way.
+    /// `torque` limited to the controller's largest torque, N m or N.
     pub fn clipped(&self, torque: f64) -> f64 {
         torque.clamp(-self.torque_limit, self.torque_limit)
     }
 
-    /// The reference as it arrives, interval by interval.
+    /// Reference position over every sample interval after speed limit and delay, rad or m.
     pub fn reference(&self, given: &Given) -> Vec<InputSegment<f64>> {
         let mut from = given.target.first().copied().unwrap_or(0.0);
         let follow = |(k, target): (usize, &f64)| {
@@ -139,7 +141,8 @@ impl JointController {
         column
     }
 
-    /// The rate of the reference as it arrives: as logged, else by central differences; zero where the velocity alone is fed back.
+    /// Reference velocity over every sample interval after its delay, rad/s or m/s: as logged, else by central differences; zero for a controller
+    /// that feeds the measured velocity back.
     pub fn reference_rate(&self, given: &Given) -> Vec<InputSegment<f64>> {
         let count = given.t.len();
         if !self.rate_of_error {
@@ -160,7 +163,7 @@ impl JointController {
         column
     }
 
-    /// The controller's inputs along the measured path.
+    /// Inputs of the controller's three parts along the measured path.
     pub fn errors(&self, given: &Given) -> Errors {
         let (reference, rate) = (self.reference(given), self.reference_rate(given));
         let apart = |a: &[InputSegment<f64>], b: &[InputSegment<f64>]| -> Vec<InputSegment<f64>> {
@@ -182,25 +185,25 @@ impl JointController {
         [proportional, apart(&rate, &given.dq), accumulated]
     }
 
-    /// The torque before the drive's limit, from the controller's inputs.
+    /// Torque along the measured path before its limit and delay, N m or N, from the controller's inputs.
     fn asked(&self, errors: &Errors) -> Vec<InputSegment<f64>> {
         let part = |gain: usize, k: usize| errors[gain][k].map(|e| self.gains[gain] * e);
         (0..errors[0].len()).map(|k| part(0, k).plus(part(1, k)).plus(part(2, k))).collect()
     }
 
-    /// The torque within the drive's limit, before its delay, along the measured path.
+    /// Torque along the measured path within its limit, before its delay, N m or N, from the controller's inputs.
     pub fn prompt_torque(&self, errors: &Errors) -> Vec<InputSegment<f64>> {
         self.asked(errors).into_iter().map(|torque| torque.map(|tau| self.clipped(tau))).collect()
     }
 
-    /// Torque that this controller commands along the measured positions, late by its delay, one input segment for each sample interval.
+    /// Torque that the controller commands along the measured path, after limit and delay, N m or N, for every sample interval.
     pub fn torque(&self, given: &Given) -> Vec<InputSegment<f64>> {
         let mut torque = self.prompt_torque(&self.errors(given));
         late(&given.t, self.delay, &mut torque);
         torque
     }
 
-    /// Mean derivative of the torque by one of the gains over every interval: nothing where the drive's limit is reached.
+    /// Mean derivative of the torque by a gain (0 `kp`, 1 `kd`, 2 `ki`) over every sample interval; zero while the torque is at its limit.
     pub fn derivative(&self, given: &Given, gain: usize) -> Vec<f64> {
         let errors = self.errors(given);
         let within = |tau: f64| if tau.abs() < self.torque_limit { 1.0 } else { 0.0 };
@@ -216,7 +219,7 @@ impl JointController {
     }
 }
 
-/// Delays a column, by the law of the library.
+/// Delays `column`, one input segment for each of the sample times `t`, by `delay`, s, as the effect `actuator_delay` does.
 fn late(t: &[f64], delay: f64, column: &mut [InputSegment<f64>]) {
     if delay > 0.0
         && let Some(law) = find::<f64>("actuator_delay")
@@ -232,7 +235,8 @@ pub(in crate::serial) mod tests {
 
     const PERIOD: f64 = 0.004;
     const COUNT: usize = 500;
-    /// What local cubics, which may be as wide as a tenth of a second, and their middles miss of these torques of up to 10 N m.
+    /// Largest error of these torques of up to 10 N m, N m, from local cubics, which may be as wide as a tenth of a second, and their values in the
+    /// middle of intervals.
     const CUBIC: f64 = 3e-3;
     pub(in crate::serial) const SERVO: JointController = JointController {
         gains: [40.0, 3.0, 0.0],
@@ -256,7 +260,7 @@ pub(in crate::serial) mod tests {
         0.6 * (3.0 * t + 0.2).sin()
     }
 
-    /// A log of a sine, its reference another sine.
+    /// Log of a joint that moves along a sine while its reference is another sine.
     fn given() -> Given {
         let t: Vec<f64> = (0..COUNT).map(|k| PERIOD * k as f64).collect();
         let path: Vec<f64> = t.iter().map(|t| q(*t)).collect();
@@ -265,7 +269,8 @@ pub(in crate::serial) mod tests {
         Given::new(&track, 0).unwrap()
     }
 
-    /// Mean over an interval of a servo that runs a hundred times in it, with `reference` and `torque` late by so many seconds.
+    /// Mean torque, N m, over sample interval `k` of a servo that runs a hundred times in it, with its reference late by `reference` and its torque
+    /// late by `late`, s.
     fn fast_servo(k: usize, servo: &JointController, reference: f64, late: f64) -> f64 {
         let steps = 100;
         let one = |i: usize| {

@@ -1,4 +1,4 @@
-//! Causes as results state them, and the status of every term that is none.
+//! Causes as results state them, and the status of every effect that was looked for and is not named.
 
 use crate::result::report::{
     Bound, Cause, CauseValue, EquivalentSummary, Named, RuledOut, SeveralJoints, Status, Value, Values,
@@ -13,10 +13,11 @@ use armgap_core::effect::{Effect, Scope, Trial, catalogue};
 /// Quantile of the normal distribution for bounds at 95 %.
 const NORMAL_95: f64 = 1.645;
 
-/// An effect that is known no better than to this part of the joint's torque has not been excited.
+/// Standard deviation of an effect's torque, relative to the joint's torque, above which the logs do not excite the effect.
 const NOT_EXCITED: f64 = 0.2;
 
-/// Unexplained share of a joint's torque in which a transmission that gives way may hide: what it does beyond first order.
+/// Unexplained share of a joint's torque above which joint elasticity and backlash are undecided: their first-order test may miss what they do beyond
+/// first order.
 const HIDES: f64 = 0.01;
 
 const NOT_TESTED: &str = "not tested on serial arms from such logs";
@@ -27,13 +28,13 @@ fn rotary_of(term: &Term, rotary: &[bool]) -> bool {
     term.joints().first().is_none_or(|j| rotary[j - 1])
 }
 
-/// Joints of what is on several of them.
+/// Joints of a term that acts on several joints, or on a sum or difference of two; empty for other terms.
 fn several(term: &Term) -> SeveralJoints {
     let joints = term.joints();
     SeveralJoints { joints: (joints.len() > 1).then_some(joints), row: term.row() }
 }
 
-/// Values of a term: numbers, or one per joint of a law on several.
+/// Values of a term's parameters with standard deviations and units: one number each, or one per joint for a law on several joints.
 fn cause_values(term: &Term, sigma: &[f64], rotary: &[bool]) -> Named<CauseValue> {
     if !term.is_on_several_joints() {
         let one = |(name, value)| (name, CauseValue::One(value));
@@ -99,7 +100,7 @@ pub(in crate::serial) fn cause(
     cause
 }
 
-/// Status of every place that is not in the model.
+/// Status of every tested effect, joint by joint, that is not among the named causes; `unexplained` is the unexplained share of each joint's torque.
 pub(in crate::serial) fn ruled_out(
     found: &Found,
     unexplained: &[Option<f64>],
@@ -129,7 +130,7 @@ pub(in crate::serial) fn ruled_out(
     all
 }
 
-/// Where a term is, behind its name.
+/// Place of a term as text that follows its name, such as ` of joint 2`.
 fn place_of(term: &Term) -> String {
     let joints: Vec<String> = term.joints().iter().map(usize::to_string).collect();
     match joints.as_slice() {

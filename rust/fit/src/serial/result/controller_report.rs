@@ -1,10 +1,11 @@
-//! What a result says of position controllers: their settings, look-alikes that no log of references and positions tells apart, and estimated gains.
+//! Results about position controllers: their changed settings, look-alikes that no log of references and positions distinguishes, and estimated
+//! gains.
 
 use crate::result::report::{Cause, CauseValue, EquivalentSummary, SeveralJoints};
 use crate::serial::controller::{JointController, PositionController};
 use crate::serial::term::{Term, TermKind};
 
-/// Controllers with the settings that terms say.
+/// Controllers (`joints`) with the settings that controller terms among `terms` change.
 pub(in crate::serial) fn with_settings(
     mut joints: Vec<JointController>,
     terms: &[Term],
@@ -17,10 +18,11 @@ pub(in crate::serial) fn with_settings(
     joints
 }
 
-/// Transmissions that give way: no candidates in logs without torques, and they change how the loop is damped as well.
+/// Names of joint elasticity and backlash as effects and as text: neither is tested in logs without torques, and both change the damping of the
+/// control loop too.
 const NOT_TESTED: [(&str, &str); 2] = [("joint_elasticity", "a shaft that twists"), ("backlash", "backlash")];
 
-/// What no log of references and positions tells from a cause, and what was not tested beside it.
+/// Look-alikes of a cause that no log of references and positions distinguishes from it, and effects that such logs cannot test beside it.
 pub(in crate::serial) fn behind_controller(
     cause: &Cause,
     controller: &PositionController,
@@ -63,7 +65,8 @@ pub(in crate::serial) fn behind_controller(
     }
 }
 
-/// Remark on gains that were estimated.
+/// Remark that lists the controllers' estimated gains, with their standard deviations and the arm file's values; `differences` from the arm file and
+/// `sigma` are in the order of [`PositionController::estimated`].
 pub(in crate::serial) fn gains_note(
     controller: &PositionController,
     differences: &[f64],
@@ -79,7 +82,7 @@ pub(in crate::serial) fn gains_note(
     (!all.is_empty()).then(|| format!("gains of the controller, estimated (stated): {}", all.join(", ")))
 }
 
-/// A number with three significant figures.
+/// The number `x` as text, with three significant figures.
 fn figure(x: f64) -> String {
     let digits = if x == 0.0 { 0.0 } else { (2.0 - x.abs().log10().floor()).clamp(0.0, 9.0) };
     format!("{x:.*}", digits as usize)

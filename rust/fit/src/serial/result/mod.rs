@@ -1,4 +1,4 @@
-//! From the end of a search to the diagnosis as data.
+//! Result of a diagnosis of a serial arm as data, from the result of the model search.
 
 pub(in crate::serial) mod cause_report;
 pub(in crate::serial) mod controller_report;
@@ -25,10 +25,10 @@ use crate::serial::term::Term;
 use crate::serial::{SerialArm, Set};
 use armgap_core::chain::Chain;
 
-/// Resamples of the holdout's windows for the interval of the closed share.
+/// Number of bootstrap resamples of the holdout's windows for the confidence interval of the closed share.
 const RESAMPLES: usize = 500;
 
-/// The three models a report compares, and their predictions on the holdout.
+/// The three models that a report compares (arm file, re-estimated, with the named causes), and their predictions on the holdout.
 struct Compared<const N: usize, const P: usize> {
     models: [Model<N, P>; 3],
     predicted: [Vec<f64>; 3],
@@ -36,7 +36,7 @@ struct Compared<const N: usize, const P: usize> {
     floor: Vec<f64>,
 }
 
-/// The diagnosis as data.
+/// Diagnosis of a serial arm as data, from the result `found` of the model search.
 pub(crate) fn assemble<const N: usize, const P: usize>(
     description: &SerialArm,
     arm: &Chain<f64, N>,
@@ -127,7 +127,8 @@ pub(crate) fn assemble<const N: usize, const P: usize>(
     }
 }
 
-/// The arm as the arm file has it, with its parameters estimated again, and with the named terms; behind the position controllers of the holdout.
+/// The three models that a report compares: with the arm file's parameters, with parameters re-estimated, and with the named terms; behind the
+/// position controllers of the holdout, if there are any.
 fn models<const N: usize, const P: usize>(
     description: &SerialArm,
     arm: &Chain<f64, N>,
@@ -148,7 +149,8 @@ fn models<const N: usize, const P: usize>(
     [of(&nominal, &[]), of(refit, &[]), of(&reported.estimate.theta, &reported.terms)]
 }
 
-/// Share of each joint in the torque that the re-estimated arm leaves unexplained, in units of the joint's own torque.
+/// Share of each joint in the torque that the re-estimated arm leaves unexplained on the holdout, largest first; each joint's unexplained torque
+/// counts relative to the joint's own torque.
 fn places<const N: usize, const P: usize>(found: &Found, holdout: &Set<N, P>) -> Vec<Location> {
     let square = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>();
     let rows = &holdout.equation.rows.joints;
@@ -225,7 +227,7 @@ fn at_horizon<const N: usize, const P: usize>(
     })
 }
 
-/// 95 % interval of the closed share from resampled holdout windows.
+/// 95 % confidence interval of the closed share of the gap, from resampled holdout windows.
 fn closed_interval<const N: usize, const P: usize>(
     compared: &Compared<N, P>,
     data: &Dataset<N>,
@@ -268,7 +270,7 @@ fn free_runs<const N: usize, const P: usize>(
     (free_run_series(&data, &measured, [&before, &after]), run)
 }
 
-/// RMS share of each joint's torque that a model leaves unexplained on the holdout; none of a joint without torque.
+/// RMS of the torque that a model leaves unexplained on the holdout, relative to the RMS torque, by joint; none for a joint without torque.
 fn unexplained<const N: usize, const P: usize>(set: &Fitted, holdout: &Set<N, P>) -> Vec<Option<f64>> {
     let square = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>();
     let rows = &holdout.equation.rows;
@@ -314,7 +316,7 @@ fn logs<const N: usize>(data: &Dataset<N>) -> Vec<LogSummary> {
     data.tracks.iter().enumerate().map(of).collect()
 }
 
-/// Remark on friction that is not dry.
+/// Remark on joints whose Coulomb friction is regularised; `widths` by joint, rad/s or m/s, zero for dry friction.
 pub(crate) fn regularised(widths: &[f64]) -> Option<String> {
     let wide: Vec<String> = widths
         .iter()
@@ -327,7 +329,7 @@ pub(crate) fn regularised(widths: &[f64]) -> Option<String> {
     })
 }
 
-/// Remarks: what share of each joint's torque stays unexplained, and which joints hardly move.
+/// Remarks of the result: the share of each joint's torque that stays unexplained, joints that hardly move, and estimated gains of controllers.
 fn notes<const N: usize, const P: usize>(
     found: &Found,
     training: &Set<N, P>,

@@ -1,8 +1,8 @@
 //! One law on several joints at once, found as one cause in one step of the model search.
 //!
-//! Friction laws, delays and lags usually act on every joint. The candidate has an amplitude per joint, or one value for all joints where the law is a delay
-//! or a gain, and is judged as a term on one joint is, by its number of parameters. It has to be significant on each joint that it keeps and on half of the
-//! moving joints, and what it explains beyond the law on the one joint where the law explains most has to be accepted by itself.
+//! Friction laws, delays and lags usually act on every joint. The candidate has an amplitude per joint, or one value for all joints where the law is
+//! a delay or a gain, and is judged as a term on one joint is, by its number of parameters. It has to be significant on each joint that it keeps and
+//! on half of the moving joints, and what it explains beyond the law on the one joint where the law explains most has to be accepted by itself.
 
 use crate::serial::constants::{ARM_WIDE, ARM_WIDE_FINALISTS, CONSEQUENCE, NOTICED, PRICE};
 use crate::serial::search::Search;

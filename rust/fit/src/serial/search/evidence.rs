@@ -17,7 +17,8 @@ pub struct Evidence {
     pub gain: f64,
     /// Decrease, by the term, of the parameters' squared distance from the prior, in standard deviations.
     pub relief: f64,
-    /// Squared robust test statistic of the term on the training logs (sandwich over blocks).
+    /// Squared test statistic of the term on the training logs: estimated size over its standard deviation, robust to residuals correlated within
+    /// blocks.
     pub statistic: f64,
     /// Decrease of the holdout's cost (weighted squared residuals) by the term, on the joints that the term acts on.
     pub holdout_gain: f64,
@@ -58,10 +59,10 @@ impl Evidence {
 impl Search<'_> {
     /// Evidence for the term of index `index` in the model `with`, compared with the model `without` the term.
     ///
-    /// On the holdout, the residuals of the model without the term are regressed on the part of them that the term removes: a slope of one says that the
-    /// effect has the size that the training logs gave it, a slope of zero that it is absent. Only joints that the term acts on count, as the scatter of
-    /// the other joints' parameters says nothing about the term. The slope's standard deviation comes from the scatter of the blocks' scores. How unevenly
-    /// an effect is spread over the blocks does not count against the effect: a stop may be met twice in a log.
+    /// On the holdout, the residuals of the model without the term are regressed on the part of them that the term removes: a slope of one says that
+    /// the effect has the size that the training logs gave it, a slope of zero that it is absent. Only joints that the term acts on count, as the
+    /// scatter of the other joints' parameters says nothing about the term. The slope's standard deviation comes from the scatter of the blocks'
+    /// scores. How unevenly an effect is spread over the blocks does not count against the effect: a stop may be met twice in a log.
     pub(in crate::serial) fn evidence(
         &self,
         regression: &Regression,
@@ -96,7 +97,8 @@ impl Search<'_> {
     }
 }
 
-/// Slope of the holdout's residuals without a term regressed on their change by the term, over the slope's standard deviation from the scatter over blocks.
+/// Slope of the holdout's residuals without a term regressed on their change by the term, over the slope's standard deviation from the scatter over
+/// blocks.
 fn confirmed(joints: &[usize], weights: &[f64], rows: &Rows, [without, with]: [&Fitted; 2]) -> f64 {
     let mut information = 0.0;
     let mut product = 0.0;
@@ -156,8 +158,9 @@ pub(in crate::serial) fn stability(model: &Fitted, rivals: &[&Fitted], seed: u64
     wins as f64 / RESAMPLES as f64
 }
 
-/// Probability that a term is not merely a substitute for an effect missing in the library: part of a joint's holdout cost that the term removes, over this
-/// part plus the cost left above noise (`floor`, by joint); for a term that restores the arm file's values, from the decrease of the prior's cost.
+/// Probability that a term is not merely a substitute for an effect missing in the library: part of a joint's holdout cost that the term removes,
+/// over this part plus the cost left above noise (`floor`, by joint); for a term that restores the arm file's values, from the decrease of the
+/// prior's cost.
 pub(in crate::serial) fn trust(without: &Fitted, with: &Fitted, evidence: &Evidence, floor: &[f64]) -> f64 {
     let joint = |set: &Fitted, j: usize| set.costs[1][j].iter().sum::<f64>();
     let own = (0..floor.len()).max_by(|a, b| {

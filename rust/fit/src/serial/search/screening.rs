@@ -62,8 +62,8 @@ impl Search<'_> {
         self.candidates.par_iter().map(|group| group.iter().map(guess).collect()).collect()
     }
 
-    /// Effective number of a term's parameters (Moody 1992). Of a link or payload, which the arm's parameters can imitate, only directions that the logs
-    /// determine better than the arm file count: `trace(I diag(sigma)^2)`, `I` the information on the term's sizes beside the arm's parameters.
+    /// Effective number of a term's parameters (Moody 1992). Of a link or payload, which the arm's parameters can imitate, only directions that the
+    /// logs determine better than the arm file count: `trace(I diag(sigma)^2)`, `I` the information on the term's sizes beside the arm's parameters.
     fn degrees(&self, regression: &Regression, at: &Estimate, term: &Term, columns: &[Signal]) -> f64 {
         let link = match term.kind {
             TermKind::NominalLink(link) => link,

@@ -1,4 +1,5 @@
-//! Terms that a serial arm's model may lack: the library's effects on single joints, and changes of the arm's links, base, transmissions and controllers.
+//! Terms that a serial arm's model may lack: the library's effects on single joints, and changes of the arm's links, base, transmissions and
+//! controllers.
 
 pub(in crate::serial) mod controller_term;
 pub(in crate::serial) mod row_term;
@@ -194,7 +195,8 @@ impl Term {
         }
     }
 
-    /// Number of leading parameters in which the term's torque is linear and which switch the term off together; 0 where the torque is linear in none.
+    /// Number of leading parameters in which the term's torque is linear and which switch the term off together; 0 where the torque is linear in
+    /// none.
     pub fn amplitudes(&self) -> usize {
         match self.kind {
             TermKind::Law(effect) => {

@@ -1,7 +1,8 @@
 //! Terms along the sum or the difference of two adjacent joints' positions: gears, belts and tendons that both joints turn, cables past both joints.
 //!
-//! With the row `r = (1, s)` of a coupled transmission (Siciliano 2009, section 5.1) and `q_r = q_j + s q_k`, a torque `tau_r` along it is the torque
-//! `r' tau_r` on the joints: `tau_r = inertia ddq_r + viscous dq_r + coulomb sign(dq_r)` of what turns with the row, and `k (q_r - q0)` of a spring on it.
+//! With the row `r = (1, s)` of a coupled transmission (Siciliano 2009, section 5.1) and the combined position `q_r = q_j + s q_k`, a torque `tau_r`
+//! that acts along `q_r` is the torque `r' tau_r` on the joints. For the parts of the transmission that turn with `q_r`, `tau_r = inertia ddq_r +
+//! viscous dq_r + coulomb sign(dq_r)`; for a spring that `q_r` extends, `tau_r = k (q_r - q0)`.
 
 use crate::log::track::Track;
 use crate::serial::term::{Term, TermKind, TermParameter};
@@ -147,7 +148,8 @@ impl RowTerm {
     }
 }
 
-/// A copy of a log with the torques of given terms, at given parameters, subtracted along the measured motion, as the integrator cannot simulate them.
+/// A copy of a log with the torques of given terms, at given parameters, subtracted along the measured motion, as the integrator cannot simulate
+/// them.
 pub fn without_rows<const N: usize>(track: &Track<N>, rows: &[(RowTerm, Vec<f64>)]) -> Track<N> {
     let mut track = track.clone();
     let intervals = Intervals::new(&track);

@@ -40,7 +40,8 @@ impl Term {
         of.members.iter().enumerate().map(|(i, member)| member.with(values(i))).collect()
     }
 
-    /// The term that parameter `k` belongs to and the parameter's index in it: the law on one joint where a law on several joints has values per joint.
+    /// The term that parameter `k` belongs to and the parameter's index in it: the law on one joint where a law on several joints has values per
+    /// joint.
     pub fn moved_by(&self, k: usize) -> (Self, usize) {
         match &self.kind {
             TermKind::Joints(of) if !of.common => {

@@ -1,9 +1,10 @@
 //! Joint elasticity and backlash in the weak form: how a deflection between motor and link changes the equation of motion.
 //!
-//! The deflection between motor and link follows from the torque `T` that the transmission passes on: `T / stiffness` of a shaft (Spong 1987, without the
-//! damping), and half the gap towards the side that `T` pushes to of backlash (Nordin and Gutman 2002). Where the encoder measures the motor, `T` is the
-//! motor's torque less those of rotor inertia and friction, and the link's position is the motor's less the deflection; where the encoder measures the
-//! link, `T` is the torque of the links, and the motor's position, at which rotor inertia and friction act, is the link's plus the deflection.
+//! The deflection between motor and link follows from the torque `T` that the transmission passes on: `T / stiffness` of a shaft (Spong 1987, without
+//! the damping), and half the gap towards the side that `T` pushes to of backlash (Nordin and Gutman 2002). Where the encoder measures the motor, `T`
+//! is the motor's torque less those of rotor inertia and friction, and the link's position is the motor's less the deflection; where the encoder
+//! measures the link, `T` is the torque of the links, and the motor's position, at which rotor inertia and friction act, is the link's plus the
+//! deflection.
 
 use crate::model::hypothesis::EffectInstance;
 use crate::serial::term::TermParameter;
@@ -89,7 +90,8 @@ impl TransmissionLaw {
         TermParameter { name, unit, bounds: [0.0, f64::INFINITY], neutral: 0.0, inverse }
     }
 
-    /// The effect for simulation at a compliance or gap `size`, with the arm's `rotor` and the joint's `inertia`, and the rotor inertia moved into the effect.
+    /// The effect for simulation at a compliance or gap `size`, with the arm's `rotor` and the joint's `inertia`, and the rotor inertia moved into
+    /// the effect.
     pub fn instance(&self, size: f64, rotor: f64, inertia: f64) -> (EffectInstance, f64) {
         let rotor_inertia = if rotor > 0.0 { rotor } else { ROTOR_SHARE * inertia };
         let (p, taken) = match self.compliance {
@@ -109,7 +111,8 @@ impl TransmissionLaw {
 }
 
 impl<const N: usize, const P: usize> Equation<N, P> {
-    /// Torque of a transmission with compliance, rad/(N m), or gap, rad, `size` by joint and row of the weak form: to first order, so in proportion to `size`.
+    /// Torque of a transmission with compliance, rad/(N m), or gap, rad, `size` by joint and row of the weak form: to first order, so in proportion
+    /// to `size`.
     pub(in crate::serial) fn of_transmission(
         &self,
         law: &TransmissionLaw,
@@ -192,7 +195,8 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         self.weak_parts(&changes)
     }
 
-    /// Change of the torque of rotor inertia and viscous friction where the encoder of joint `j` measures the link and the motor leads by the deflection.
+    /// Change of the torque of rotor inertia and viscous friction where the encoder of joint `j` measures the link and the motor leads by the
+    /// deflection.
     fn of_motor(&self, j: usize, deflections: &[Vec<[f64; 2]>], theta: &[f64; P]) -> Signal {
         let (rotor, viscous) = (theta[10 * N + j], self.arm.viscous(theta)[j]);
         if rotor == 0.0 && viscous == 0.0 {

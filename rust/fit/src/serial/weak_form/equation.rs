@@ -1,4 +1,4 @@
-//! The weak equation of motion of a serial arm along its logs, and the torque of any term along the same motion.
+//! Weak form of a serial arm's equation of motion along its logs, and the torque of any term of the model along the same motion.
 
 use crate::log::track::Track;
 use crate::model::hypothesis::EffectInstance;
@@ -15,41 +15,41 @@ use armgap_core::kinematics::{JointState, RigidArm};
 use nalgebra::SVector;
 use rayon::prelude::*;
 
-/// Length of a block, s, over which the torque that the model lacks may be correlated.
+/// Length of a block of a log, s: the torque that the model lacks may be correlated within a block, not beyond.
 const BLOCK_S: f64 = 1.0;
 
-/// Share of a row's test function beyond which a joint at rest makes the row no datum.
+/// Integral of a test function over the time at rest of a joint, 0 to 1, above which the test function gives no row for the joint.
 const MOSTLY_AT_REST: f64 = 0.05;
 
-/// Time step for the rate of the inertia matrix along the motion, s.
+/// Time step of the numerical derivative of the inertia matrix along the motion, s.
 const RATE_STEP: f64 = 1e-5;
 
-/// Poses along the logs at which the inertia matrix is evaluated.
+/// Approximate number of samples along the logs at which the inertia matrix is evaluated.
 const POSES: usize = 200;
 
-/// The weak equation of motion of a serial arm along logs.
+/// Weak form of the equation of motion of a serial arm along logs: one row for each joint and each test function during which the joint moves.
 pub struct Equation<const N: usize, const P: usize> {
     /// Kinematic chain of the arm.
     pub arm: Chain<f64, N>,
-    /// Rows of the regression on the arm's parameters, by joint.
+    /// Rows of the regression on the arm's parameters, and on controllers' estimated gains, by joint.
     pub rows: Rows,
     pub(in crate::serial) logs: Vec<Intervals<N>>,
     times: Vec<Vec<f64>>,
     held: Vec<Vec<[InputSegment<f64>; N]>>,
     pub(in crate::serial) functions: Vec<TestFunction>,
-    /// Indices of the test functions during which each joint moves, by joint: one row each.
+    /// Indices, by joint, of the test functions during which the joint moves; each gives one row.
     pub(in crate::serial) kept: Vec<Vec<usize>>,
-    /// Cached torques of elastic joints and backlash.
+    /// Cached torque signals of elastic joints and backlash.
     pub(in crate::serial) computed: Computed<P>,
-    /// Position controllers that make the torques in logs with references; none for logs with torques.
+    /// Position controllers that command the torques in logs with references; none for logs with torques.
     pub(in crate::serial) commanded: Option<Commanded<N>>,
 }
 
-/// Torques by joint, log and sample interval, N m or N; none on joints that a term does not act on.
+/// Torques by joint, log and sample interval, N m or N; none for joints that a term does not act on.
 pub(in crate::serial) type Torques<const N: usize> = [Option<Vec<Vec<f64>>>; N];
 
 impl<const N: usize, const P: usize> Equation<N, P> {
-    /// The weak equation along logs with test functions of `half_width`, s; `theta` are nominal parameters.
+    /// Weak form of the equation of motion along `tracks`, with test functions of `half_width`, s; `theta` are the nominal parameters, SI.
     pub fn new(arm: Chain<f64, N>, theta: &[f64; P], tracks: &[Track<N>], half_width: f64) -> Self {
         let logs: Vec<Intervals<N>> = tracks.iter().map(Intervals::new).collect();
         let functions: Vec<TestFunction> =
@@ -85,7 +85,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
             let duration = log.middles.last().map_or(0.0, |m| m.t + 0.5 * m.h);
             first_block.push(first_block[first_block.len() - 1] + (duration / BLOCK_S) as usize + 1);
         }
-        // Along every interval: momentum, and what is left of the torque, per unit of every parameter.
+        // For every sample interval, per unit of every parameter: the momentum, and the torque without the momentum's derivative.
         let terms: Vec<Vec<[Vec<f64>; 2]>> = self
             .logs
             .iter()
@@ -136,7 +136,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         Rows { joints, parameters: P, blocks: first_block[self.logs.len()] }
     }
 
-    /// Regressors of the momentum, and of the torque without the momentum's derivative, in the middle of an interval, by joint and parameter.
+    /// Regressors in the middle of a sample interval, by joint and parameter: of the momentum, and of the torque without the momentum's derivative.
     fn regressors(&self, m: &Middle<N>) -> [Vec<f64>; 2] {
         let q = SVector::from(m.q);
         let momentum = self.arm.momentum_regressor(&q, &SVector::from(m.mean_dq));
@@ -146,7 +146,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         [momentum, rest].map(|x| (0..N).flat_map(|j| (0..P).map(move |i| (j, i))).map(|at| x[at]).collect())
     }
 
-    /// Standard deviation that noisy positions put into a row through the momentum, N m or N.
+    /// Standard deviation, N m or N, of a row due to the noise of the positions in its momentum; `inertia` is the joint's row of the inertia matrix.
     fn floor(&self, phi: &TestFunction, inertia: &[f64; N]) -> f64 {
         let log = &self.logs[phi.log];
         let factors = phi.on_positions(&log.middles, [1.0, 0.0, 0.0]);
@@ -155,7 +155,8 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         (variance * square).sqrt()
     }
 
-    /// Change of the velocity sign's column in the rows of joint `j` when the sign is regularised over `width`, rad/s (m/s), as `tanh(dq / width)`.
+    /// Change, by row, of the regressor's column of joint `j`'s Coulomb coefficient when `sign(dq)` becomes `tanh(dq / width)`, with `width` in rad/s
+    /// (m/s).
     pub fn regularised(&self, j: usize, width: f64) -> Vec<f64> {
         let row = |i: &usize| {
             let phi = &self.functions[*i];
@@ -171,7 +172,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         change
     }
 
-    /// Regularises the Coulomb friction of every joint over a width, rad/s (m/s); zero leaves it dry.
+    /// Regularises the Coulomb friction of every joint over a width by joint, rad/s (m/s); zero leaves the friction dry.
     pub fn regularise(&mut self, widths: &[f64]) {
         for (j, width) in widths.iter().enumerate().filter(|(_, width)| **width > 0.0) {
             let change = self.regularised(j, *width);
@@ -182,7 +183,8 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         }
     }
 
-    /// Torque of a term by joint and row, on the left-hand side of the equation: what the arm needs on top of its own torque.
+    /// Torque of a term by joint and row of the weak form, N m or N, on the left-hand side of the equation of motion: added to the torque of the
+    /// arm's own parameters.
     pub fn signal(&self, term: &Term, theta: &[f64; P]) -> Signal {
         let mut signal = self.signal_with_mean(term, theta);
         for (j, values) in signal.iter_mut().enumerate() {
@@ -193,7 +195,8 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         signal
     }
 
-    /// Torque of a term by joint and row, before the mean over each log is left out of joints with an integral controller.
+    /// Torque of a term by joint and row of the weak form, N m or N, like [`Self::signal`] but with the mean over each log, also for joints with an
+    /// integral controller.
     pub(in crate::serial) fn signal_with_mean(&self, term: &Term, theta: &[f64; P]) -> Signal {
         match term.kind {
             TermKind::Law(_) => match term.effect() {
@@ -214,7 +217,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         }
     }
 
-    /// Torque by joint and row of a change of one link's ten inertial parameters.
+    /// Torque by joint and row of the weak form, N m or N, due to a `change` of one link's ten inertial parameters.
     fn of_link(&self, link: usize, change: &[f64; 10]) -> Signal {
         let joint = |(j, rows): (usize, &JointRows)| {
             (j <= link).then(|| {
@@ -225,7 +228,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         self.rows.joints.iter().enumerate().map(joint).collect()
     }
 
-    /// Averages of torques over the test functions of each joint's rows.
+    /// Torques weighted by the test functions, by joint and row of the weak form.
     pub(in crate::serial) fn weak(&self, torques: &Torques<N>) -> Signal {
         let joint = |j: usize| {
             torques[j].as_ref().map(|torque| {
@@ -240,7 +243,8 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         (0..N).map(joint).collect()
     }
 
-    /// Torque by joint and row of a law on one joint: a torque, a part of dry friction, an inertia, or a change of the command.
+    /// Torque by joint and row of the weak form, N m or N, of an effect on one joint that adds a torque, dry friction or inertia, or changes the
+    /// commanded torque.
     fn of_law(&self, effect: &EffectInstance, theta: &[f64; P]) -> Signal {
         let (spec, j) = (effect.law.spec(), effect.joint);
         let mut torques: Torques<N> = std::array::from_fn(|_| None);
@@ -272,7 +276,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         signal
     }
 
-    /// Torque of a law along a log, interval by interval, N m or N.
+    /// Torque of an effect along a log, sample interval by sample interval, N m or N.
     fn along(&self, log: &Intervals<N>, effect: &EffectInstance, theta: &[f64; P]) -> Vec<f64> {
         let (spec, j) = (effect.law.spec(), effect.joint);
         let viscous = self.arm.viscous(theta)[j];
@@ -306,7 +310,8 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         log.middles.iter().map(torque).collect()
     }
 
-    /// Torque by joint and row of an effect by which measured positions are not the joints': difference of the arm's own torque along both.
+    /// Torque by joint and row of the weak form, N m or N, of an effect that distorts measured positions: the arm's torque along the true positions
+    /// minus the torque along the measured positions.
     fn displaced(&self, effect: &EffectInstance, theta: &[f64; P]) -> Signal {
         let j = effect.joint;
         let actual = |reading: f64| {
@@ -338,7 +343,8 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         self.weak_parts(&differences)
     }
 
-    /// Rows, by joint, of a change of the momentum and of the rest of the torque given for every interval of every log.
+    /// Torque by joint and row of the weak form, N m or N, due to changes of the momentum and of the torque without the momentum's derivative, given
+    /// by log and sample interval.
     pub(in crate::serial) fn weak_parts(&self, changes: &[Vec<[SVector<f64, N>; 2]>]) -> Signal {
         let joint = |joint: usize| {
             let row = |i: &usize| {
@@ -360,7 +366,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         &self.logs
     }
 
-    /// Mean inertia of every joint along the logs, kg m^2 or kg.
+    /// Mean diagonal of the inertia matrix along the logs, by joint, kg m^2 or kg.
     pub fn mean_inertia(&self, theta: &[f64; P]) -> Vec<f64> {
         let mut total = [0.0; N];
         let mut count = 0.0;
@@ -372,13 +378,13 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         total.map(|t| t / count).to_vec()
     }
 
-    /// States at some 200 intervals along the logs.
+    /// Evenly spaced sample intervals along the logs, some 200.
     fn poses(&self) -> impl Iterator<Item = &Middle<N>> {
         let stride = (self.logs.iter().map(|log| log.middles.len()).sum::<usize>() / POSES).max(1);
         self.logs.iter().flat_map(move |log| log.middles.iter().step_by(stride))
     }
 
-    /// Smallest eigenvalue, along the logs, of the inertia matrix scaled to unit diagonal; -1 where a diagonal entry is not positive.
+    /// Smallest eigenvalue of the inertia matrix scaled to unit diagonal, the least along the logs; -1 where a diagonal entry is not positive.
     pub fn conditioning(&self, theta: &[f64; P]) -> f64 {
         let smallest = |m: &Middle<N>| {
             let inertia = self.arm.inertia(theta, &SVector::from(m.q));
@@ -392,7 +398,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         self.poses().map(smallest).fold(1.0, f64::min)
     }
 
-    /// Momentum, and the torque without the momentum's derivative: `C dq + g - dM/dt dq` and friction.
+    /// Momentum `M dq`, and the torque without the momentum's derivative, `C dq + g - dM/dt dq` plus friction, in a sample interval.
     pub(in crate::serial) fn parts(&self, m: &Middle<N>, theta: &[f64; P]) -> [SVector<f64, N>; 2] {
         let (q, dq) = (SVector::from(m.q), SVector::from(m.dq));
         let momentum = self.arm.inertia(theta, &q) * SVector::from(m.mean_dq);
@@ -414,7 +420,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         }
     }
 
-    /// Torque by joint and row of gravity turned with the base by `p`, rad about two horizontal axes.
+    /// Torque by joint and row of the weak form, N m or N, due to a tilt of the base by `p`, rad, about two horizontal axes.
     fn of_tilt(&self, p: &[f64], theta: &[f64; P]) -> Signal {
         let theta = SVector::from(*theta);
         if p[0] == 0.0 && p[1] == 0.0 {

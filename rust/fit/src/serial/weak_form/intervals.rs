@@ -1,4 +1,4 @@
-//! A log as its sample intervals: the state in the middle of each interval, the torque held over it, and the test functions of the weak form.
+//! A log as a sequence of sample intervals: state in the middle of each interval, mean torque over it, and the test functions of the weak form.
 //!
 //! With a smooth test function `phi` of compact support, the weak form of the equation of motion
 //!
@@ -6,15 +6,15 @@
 //! - int phi' M(q) dq dt + int phi (g - dK/dq + f) dt = int phi tau dt
 //! ```
 //!
-//! needs no acceleration: it is the filtered dynamic regression of Reyes and Kelly (1997) with a symmetric filter of finite length in place of the first-order
-//! one. Velocities in the momentum are differences of positions over the interval, whose mean they are exactly; friction and whatever depends on the sign of a
-//! velocity take the velocity from local cubics.
+//! needs no acceleration: this is the filtered dynamic regression of Reyes and Kelly (1997) with a symmetric filter of finite length in place of the
+//! first-order one. Velocities in the momentum are differences of positions, which are exact means over a sample interval; friction and everything
+//! else that depends on the sign of a velocity take the velocity from local cubics.
 
 use crate::log::track::Track;
 use std::f64::consts::PI;
 
-/// Half width of a test function, s: its transfer function falls to one half at 0.5 / `HALF_WIDTH_S`, here 10 Hz. Friction torques of a reversal are smeared over
-/// it; the noise of positions enters with its inverse square.
+/// Half width of a test function, s: its transfer function falls to one half at `0.5 / HALF_WIDTH_S`, here 10 Hz. Friction torques at a reversal are
+/// smeared over the test function; the position noise in a row grows with the inverse square of the half width.
 pub const HALF_WIDTH_S: f64 = 0.05;
 
 /// Smallest half width of a test function, in sample periods.
@@ -23,17 +23,18 @@ const FEWEST_PERIODS: f64 = 5.0;
 /// Distance between neighbouring test functions, in half widths.
 const SPACING: f64 = 0.5;
 
-/// Standard deviations of a joint's velocity below which the joint is at rest; dry friction then is a bound and no datum.
+/// Speed, in standard deviations of the measured velocity, below which a joint counts as at rest: the measured torque then only bounds the dry
+/// friction.
 const AT_REST: f64 = 3.0;
 
-/// Speed, relative to a joint's RMS speed, below which the joint counts as at rest: it may creep, before it slides, under a torque below its Coulomb level. A
-/// reversal at a tenth of the largest acceleration is as slow for some milliseconds.
+/// Speed, relative to a joint's RMS speed, below which the joint counts as at rest: before it slides, it may creep under a torque below its Coulomb
+/// level. At a reversal with a tenth of the largest acceleration a joint is as slow for some milliseconds.
 const SLOW: f64 = 0.01;
 
 /// Time between two samples, in sample periods, beyond which a stretch of a log ends.
 const GAP: f64 = 3.5;
 
-/// State and torque in the middle of a sample interval.
+/// State in the middle of a sample interval and mean torque over it, by joint.
 #[derive(Debug, Clone, Copy)]
 pub struct Middle<const N: usize> {
     /// Time in the middle of the interval since the start of the log, s.
@@ -50,11 +51,11 @@ pub struct Middle<const N: usize> {
     pub mean_dq: [f64; N],
     /// Mean torques over the interval, N m or N.
     pub tau: [f64; N],
-    /// Whether each joint is at rest in the interval.
+    /// Whether each joint is at rest in the interval, so that its dry friction is unknown.
     pub rest: [bool; N],
 }
 
-/// A log as its sample intervals.
+/// A log as a sequence of sample intervals.
 #[derive(Debug, Clone)]
 pub struct Intervals<const N: usize> {
     /// States and torques in the middle of the sample intervals, in order of time.
@@ -93,7 +94,7 @@ impl<const N: usize> Intervals<N> {
         Self { middles: (0..track.len().saturating_sub(1)).map(middle).collect(), noise: track.noise }
     }
 
-    /// Test functions over the log of index `log`, with `half_width`, s, or a wider one where the log has few samples.
+    /// Test functions over the log, each of `half_width`, s, or wider where the log has few samples; `log` is the index of the log.
     pub fn test_functions(&self, log: usize, half_width: f64) -> Vec<TestFunction> {
         let period = crate::log::track::median(self.middles.iter().map(|m| m.h).collect());
         let half = half_width.max(FEWEST_PERIODS * period);
@@ -142,7 +143,7 @@ pub struct TestFunction {
 }
 
 impl TestFunction {
-    /// Integral of the test function over an interval.
+    /// Integral of the test function over the sample interval `m`, dimensionless; the sum over all intervals is 1.
     pub fn weight<const N: usize>(&self, m: &Middle<N>) -> f64 {
         let area = |t: f64| {
             let x = ((t - self.centre) / self.half).clamp(-1.0, 1.0);
@@ -151,13 +152,14 @@ impl TestFunction {
         area(m.t + 0.5 * m.h) - area(m.t - 0.5 * m.h)
     }
 
-    /// Mean derivative of the test function over an interval times the interval's length, 1/s.
+    /// Difference of the test function between end and start of the sample interval `m`, 1/s: the integral of its derivative.
     pub fn rise<const N: usize>(&self, m: &Middle<N>) -> f64 {
         self.value(m.t + 0.5 * m.h) - self.value(m.t - 0.5 * m.h)
     }
 
-    /// Factors on the positions, sample by sample from the start of the first interval on, in a row whose momentum holds `momentum` times the mean velocity, and
-    /// whose torque holds `stiffness` times the position and `damping` times the velocity.
+    /// Factors on the measured positions in a row of the weak form, sample by sample from the start of the test function's first interval on.
+    ///
+    /// The row's momentum is `momentum` times the mean velocity, and its torque `stiffness` times the position plus `damping` times the velocity.
     pub fn on_positions<const N: usize>(
         &self,
         middles: &[Middle<N>],

@@ -1,4 +1,5 @@
-//! The weak form of the equation of motion: intervals of a log -> equation (torques of terms) -> rows (regression on the arm's parameters).
+//! Weak form of the equation of motion along logs: `intervals` (sample intervals and test functions) -> `equation` (torques of terms) -> `rows`
+//! (regression on the arm's parameters).
 
 pub(super) mod equation;
 pub(super) mod intervals;

@@ -1,16 +1,18 @@
-//! Width over which the sign of each joint's dry friction is regularised: a nuisance, fitted and never named.
+//! Widths over which the sign of each joint's dry friction is regularised around standstill: nuisances, fitted and never reported as a cause.
 //!
-//! Where friction comes from a soft constraint, as in some simulators, or from grease, its torque does not jump at a reversal. A jump in the model leaves a
-//! residual there that looks like a delay of the torque.
+//! Where friction comes from grease, or from a soft constraint as in some simulators, its torque does not jump at a reversal. A model with a jump
+//! leaves a residual at reversals that looks like a delay of the torque.
 
 use crate::serial::constants::PRICE;
 use crate::serial::weak_form::rows::{Prior, Regression, Rows};
 
-/// Widths of friction regularisation that are tried, rad/s (m/s).
+/// Widths of friction regularisation that are tried besides none, rad/s (m/s).
 const WIDTHS: [f64; 7] = [0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2];
 
-/// Width of friction regularisation by joint, rad/s (m/s), zero for dry friction; `coulomb` is the index of the first Coulomb coefficient among the parameters,
-/// `change(j, width)` what a width changes in the sign's column of joint `j`'s rows.
+/// Width of friction regularisation by joint, rad/s (m/s), zero for dry friction.
+///
+/// `coulomb` is the index of the first Coulomb coefficient among the parameters, and `change(j, width)` the change, by row, of the regressor's column
+/// of joint `j`'s Coulomb coefficient when the sign is regularised over `width`.
 pub fn widths(
     rows: &Rows,
     prior: &Prior,

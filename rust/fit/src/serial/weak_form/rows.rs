@@ -1,42 +1,42 @@
-//! Rows of the weak equation of motion, joint by joint, and their regression on the arm's parameters beside given torques.
+//! Regression of the weak form's rows, joint by joint, on the arm's parameters, given the torques of further terms.
 
 use nalgebra::{DMatrix, DVector};
 
-/// Rows over which residuals count as correlated at most, a quarter of a second: disturbances have memories of 0.05 to 0.3 s, and what is correlated for longer is
-/// what the model lacks.
+/// Largest lag, in rows, over which residuals count as correlated, a quarter of a second: disturbances are correlated over 0.05 to 0.3 s, and a
+/// longer correlation comes from what the model lacks.
 const LONGEST_CORRELATION: usize = 10;
 
-/// Rounds in which the weights of rows follow from residuals.
+/// Number of rounds in which parameters are estimated and the rows' weights computed from the residuals.
 const WEIGHT_ROUNDS: usize = 4;
 
-/// Rows of one joint: `y = psi theta + torques of terms`.
+/// Rows of one joint in the weak form: `y = psi theta + torques of terms`, one row per test function.
 #[derive(Debug, Clone)]
 pub struct JointRows {
     /// Torque, one value per row, N m or N.
     pub y: Vec<f64>,
-    /// Regressor, row by row.
+    /// Regressor, one row per row of `y`, row by row.
     pub psi: Vec<f64>,
-    /// Index of the block, of a second or so, that each row belongs to.
+    /// Index of the block, a stretch of one second, that each row belongs to.
     pub block: Vec<usize>,
-    /// Standard deviation that the noise of positions puts into each row, N m or N.
+    /// Standard deviation of each row due to the noise of positions, N m or N.
     pub floor: Vec<f64>,
 }
 
-/// Rows of the weak equation of motion of all joints.
+/// Rows of the weak form of all joints.
 #[derive(Debug, Clone)]
 pub struct Rows {
     /// Rows of each joint.
     pub joints: Vec<JointRows>,
     /// Number of columns of the regressor.
     pub parameters: usize,
-    /// Number of blocks, of a second or so, in all logs.
+    /// Number of blocks, stretches of one second, in all logs.
     pub blocks: usize,
 }
 
-/// A torque beside the arm's own, by joint and row, N m or N; none on joints it does not act on.
+/// Torque added to that of the arm's own parameters, by joint and row of the weak form, N m or N; none for joints that the torque does not act on.
 pub type Signal = Vec<Option<Vec<f64>>>;
 
-/// Prior of the parameters: values, standard deviations, and which may not be negative.
+/// Gaussian prior of the regression's parameters, with the parameters that may not be negative.
 #[derive(Debug, Clone)]
 pub struct Prior {
     /// Prior values of the parameters, SI.
@@ -48,7 +48,7 @@ pub struct Prior {
 }
 
 impl Prior {
-    /// Squared distance of `theta` from the prior values, in standard deviations.
+    /// Squared distance of `theta` from the prior values, counted in standard deviations.
     pub fn cost(&self, theta: &[f64]) -> f64 {
         let off = |i: usize| {
             if self.sigma[i] > 0.0 { ((theta[i] - self.theta[i]) / self.sigma[i]).powi(2) } else { 0.0 }
@@ -57,7 +57,7 @@ impl Prior {
     }
 }
 
-/// Sum of torque signals, by joint and row.
+/// Sum of several torque signals, by joint and row.
 pub fn sum(rows: &Rows, signals: &[Signal]) -> Signal {
     let of = |j: usize| {
         let mut total: Option<Vec<f64>> = None;
@@ -73,7 +73,7 @@ pub fn sum(rows: &Rows, signals: &[Signal]) -> Signal {
 }
 
 impl JointRows {
-    /// Residuals of one joint's rows after the parameters' and a further torque (`beside`), N m or N.
+    /// Residuals of one joint's rows, N m or N: `y` less the torque of the parameters `theta` and a further torque (`beside`).
     fn residual(&self, theta: &[f64], beside: Option<&Vec<f64>>) -> Vec<f64> {
         let p = theta.len();
         let row = |i: usize| {
@@ -85,13 +85,13 @@ impl JointRows {
 }
 
 impl Rows {
-    /// Residuals by joint and row after the parameters' and a further torque (`beside`), N m or N.
+    /// Residuals by joint and row, N m or N: `y` less the torque of the parameters `theta` and a further torque (`beside`).
     pub fn residual(&self, theta: &[f64], beside: &Signal) -> Vec<Vec<f64>> {
         self.joints.iter().zip(beside).map(|(rows, s)| rows.residual(theta, s.as_ref())).collect()
     }
 
-    /// Weight of each joint's rows from their residuals: one over the variance, and over the number of rows that count as one because they are correlated. A joint
-    /// without rows weighs nothing.
+    /// Weight of each joint's rows, 1/(N m)^2 or 1/N^2: the inverse of the residuals' variance times the number of correlated rows that count as one.
+    /// A joint without rows has weight zero.
     pub fn weights(&self, residual: &[Vec<f64>]) -> Vec<f64> {
         let of = |(rows, r): (&JointRows, &Vec<f64>)| {
             let n = r.len() as f64;
@@ -116,7 +116,8 @@ impl Rows {
     }
 }
 
-/// Number of rows that count as one: one plus twice the sum of their residuals' correlations up to the first that is not positive.
+/// Number of correlated rows that count as one independent row: one plus twice the sum of the residuals' autocorrelations up to the first that is not
+/// positive.
 fn correlation_length(r: &[f64]) -> f64 {
     let total: f64 = r.iter().map(|r| r * r).sum();
     let mut length = 1.0;
@@ -130,19 +131,19 @@ fn correlation_length(r: &[f64]) -> f64 {
     length
 }
 
-/// Regression of the weak equation's rows on the arm's parameters, with their prior.
+/// Regression of the weak form's rows on the arm's parameters, with their prior.
 pub struct Regression<'a> {
-    /// Rows of the weak equation of motion.
+    /// Rows of the weak form.
     pub rows: &'a Rows,
     /// Prior of the arm's parameters.
     pub prior: &'a Prior,
     /// Weight of each joint's rows, 1/(N m)^2 or 1/N^2.
     pub weights: Vec<f64>,
-    /// Normal matrix of the data without the prior.
+    /// Normal matrix `Psi' W Psi` of the data, without the prior.
     normal: DMatrix<f64>,
 }
 
-/// Parameters that fit best beside a given torque.
+/// Estimated parameters of a regression with a given further torque.
 #[derive(Debug, Clone)]
 pub struct Estimate {
     /// Estimated parameters, SI.
@@ -151,12 +152,12 @@ pub struct Estimate {
     pub residual: Vec<Vec<f64>>,
     /// Weighted squared residuals plus squared distance from the prior.
     pub cost: f64,
-    /// Squared distance of the parameters from the prior, in standard deviations.
+    /// Squared distance of the parameters from the prior values, counted in standard deviations.
     pub prior_cost: f64,
 }
 
 impl<'a> Regression<'a> {
-    /// A regression with given weights of each joint's rows.
+    /// A regression with given `weights` of each joint's rows, 1/(N m)^2 or 1/N^2.
     pub fn new(rows: &'a Rows, prior: &'a Prior, weights: Vec<f64>) -> Self {
         let p = rows.parameters;
         let mut normal = DMatrix::zeros(p, p);
@@ -167,7 +168,7 @@ impl<'a> Regression<'a> {
         Self { rows, prior, weights, normal }
     }
 
-    /// A regression with weights that follow from the residuals beside the torque `beside`.
+    /// A regression with weights of the rows from the residuals of an estimate with the further torque `beside`.
     pub fn reweighted(rows: &'a Rows, prior: &'a Prior, beside: &Signal) -> Self {
         let scale = |rows: &JointRows| {
             let square = rows.y.iter().map(|y| y * y).sum::<f64>() / rows.y.len().max(1) as f64;
@@ -181,7 +182,7 @@ impl<'a> Regression<'a> {
         regression
     }
 
-    /// Product `Psi' W s` of the weighted regressor with a signal.
+    /// Product `Psi' W s` of the weighted regressor with the torque signal `s`.
     fn along(&self, signal: &Signal) -> DVector<f64> {
         let p = self.rows.parameters;
         let mut total = DVector::zeros(p);
@@ -195,7 +196,7 @@ impl<'a> Regression<'a> {
         total
     }
 
-    /// Weighted inner product of two signals.
+    /// Weighted inner product `a' W b` of two torque signals.
     fn product(&self, a: &Signal, b: &Signal) -> f64 {
         let of = |j: usize| match (&a[j], &b[j]) {
             (Some(a), Some(b)) => self.weights[j] * a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>(),
@@ -204,7 +205,8 @@ impl<'a> Regression<'a> {
         (0..a.len()).map(of).sum()
     }
 
-    /// Cholesky factor of the normal matrix with the prior's precision, in which `held` values are pinned; none if it is not positive definite.
+    /// Cholesky factor of the normal matrix plus the prior's precision, with the rows and columns of `held` parameters replaced by the identity; none
+    /// if the matrix is not positive definite.
     fn system(&self, held: &[bool]) -> Option<nalgebra::Cholesky<f64, nalgebra::Dyn>> {
         let mut system = self.normal.clone();
         let p = self.rows.parameters;
@@ -220,12 +222,12 @@ impl<'a> Regression<'a> {
         system.cholesky()
     }
 
-    /// Whether each parameter is not estimated.
+    /// Whether each parameter is fixed at its prior value, not estimated.
     fn fixed(&self) -> Vec<bool> {
         self.prior.sigma.iter().map(|s| *s <= 0.0).collect()
     }
 
-    /// Best parameters beside the torque `beside`; coefficients that would be negative are held at zero.
+    /// Estimated parameters with the further torque `beside`; coefficients that may not be negative and would be are held at zero.
     pub fn estimate(&self, beside: &Signal) -> Estimate {
         let p = self.rows.parameters;
         let torque: Signal = self
@@ -276,13 +278,13 @@ impl<'a> Regression<'a> {
         Estimate { theta: value, residual, cost: data + prior_cost, prior_cost }
     }
 
-    /// First-order test of further torques (`columns`) against the residual of an estimate, the parameters fitted beside them; `ridge` is the prior precision by
-    /// which their sizes are near zero.
+    /// First-order test of further torques (`columns`) against the residual of the estimate `at`, with the parameters re-estimated at the same time;
+    /// `ridge` is the prior precision (inverse variance) of each torque's size around zero. None if a matrix is singular.
     pub fn score(&self, at: &Estimate, columns: &[Signal], ridge: &[f64]) -> Option<Score> {
         let k = columns.len();
         let fixed = self.fixed();
         let system = self.system(&fixed)?;
-        // Values that are not estimated imitate nothing.
+        // Parameters that are not estimated cannot take over a part of the torque.
         let estimated = |mut along: DVector<f64>| {
             along.iter_mut().zip(&fixed).filter(|(_, fixed)| **fixed).for_each(|(x, _)| *x = 0.0);
             along
@@ -300,7 +302,8 @@ impl<'a> Regression<'a> {
         Some(Score { size: size.iter().copied().collect(), gain, information, inverse, solved })
     }
 
-    /// Covariance of the sizes of further torques from the scatter of their scores over blocks, at an estimate that includes them (sandwich).
+    /// Covariance of the sizes of further torques (`columns`) from the scatter of their scores over blocks, at an estimate that includes the torques:
+    /// robust to correlated residuals (sandwich estimator).
     pub fn sandwich(&self, at: &Estimate, columns: &[Signal], score: &Score) -> DMatrix<f64> {
         let (k, p) = (columns.len(), self.rows.parameters);
         let mut blocks = vec![DVector::<f64>::zeros(k); self.rows.blocks];
@@ -325,7 +328,8 @@ impl<'a> Regression<'a> {
         &score.inverse * scatter * &score.inverse * small_sample
     }
 
-    /// Standard deviations of the parameters from the curvature of the cost, SI.
+    /// Standard deviations of the parameters, SI, from the inverse of the normal matrix plus the prior's precision; of fixed parameters those of the
+    /// prior.
     pub fn sigma(&self) -> Vec<f64> {
         let fixed = self.fixed();
         let inverse = self.system(&fixed).map(|s| s.inverse());
@@ -339,12 +343,13 @@ impl<'a> Regression<'a> {
 }
 
 impl Score {
-    /// Information of the data on size `i` beside the parameters, without the ridge.
+    /// Information of the data on the size of torque `i`, with the parameters re-estimated, without the prior precision of the size.
     pub fn information(&self, i: usize) -> f64 {
         self.information[(i, i)]
     }
 
-    /// Covariance of the sizes if residuals were as independent as their weights take them to be, and the parameters as well known as their prior says.
+    /// Covariance of the torques' sizes if the weights of the rows describe the residuals' noise and correlation; see [`Regression::sandwich`] for
+    /// the robust covariance.
     pub fn inverse(&self) -> &DMatrix<f64> {
         &self.inverse
     }
@@ -355,13 +360,13 @@ impl Score {
 pub struct Score {
     /// Estimated sizes of the tested torques.
     pub size: Vec<f64>,
-    /// Decrease of the cost to first order by the tested torques.
+    /// Decrease of the cost, to first order, when the tested torques are added.
     pub gain: f64,
-    /// Information matrix of the data on the sizes beside the parameters.
+    /// Information matrix of the data on the sizes of the tested torques, with the parameters re-estimated.
     information: DMatrix<f64>,
-    /// Inverse of the information matrix with the ridge added.
+    /// Inverse of the information matrix plus the prior precision of the sizes.
     inverse: DMatrix<f64>,
-    /// Parameters that imitate each tested torque.
+    /// Change of the parameters that comes closest to each tested torque.
     solved: Vec<DVector<f64>>,
 }
 
@@ -372,7 +377,7 @@ mod tests {
 
     const ROWS: usize = 400;
 
-    /// Rows of one joint with two parameters, and a further torque: `y = 3 psi1 + 0.5 psi2 + size extra + noise`.
+    /// Rows of one joint with two parameters and a further torque of the given size: `y = 3 psi1 + 0.5 psi2 + size extra + noise`.
     fn rows(size: f64, noise: f64) -> (Rows, Signal) {
         let mut random = Random(3);
         let at = |k: usize, rate: f64| (rate * k as f64).sin();
