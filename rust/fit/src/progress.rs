@@ -74,7 +74,7 @@ pub enum Control {
     /// Continue the computation.
     Go,
     /// Cancel the computation with an error at its next progress check.
-    ContactGuess,
+    Stop,
 }
 
 /// Function that receives progress reports and may cancel; called often and from any thread, so it must be quick.
@@ -150,7 +150,7 @@ impl ProgressReporter {
 
     /// Reports the current progress to the observer; does not return if the observer cancels.
     pub fn check(&self) {
-        if (self.observer)(self.current()) == Control::ContactGuess {
+        if (self.observer)(self.current()) == Control::Stop {
             resume_unwind(Box::new(Stopped));
         }
     }
@@ -214,9 +214,8 @@ mod tests {
 
     #[test]
     fn stopping_unwinds_through_threads_to_the_guard() {
-        let reporter = ProgressReporter::new(Arc::new(|p| {
-            if p.fraction > 0.05 { Control::ContactGuess } else { Control::Go }
-        }));
+        let reporter =
+            ProgressReporter::new(Arc::new(|p| if p.fraction > 0.05 { Control::Stop } else { Control::Go }));
         reporter.begin(Phase::Candidates, 100);
         let result = guarded(|| (0..100).into_par_iter().map(|_| reporter.unit()).count());
         assert_eq!(result, None);

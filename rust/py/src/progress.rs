@@ -110,6 +110,6 @@ fn observer(shared: &Arc<Shared>) -> Observer {
     let shared = Arc::clone(shared);
     Arc::new(move |progress| {
         *shared.latest.lock().unwrap_or_else(PoisonError::into_inner) = Some(progress);
-        if shared.stop.load(Relaxed) { Control::ContactGuess } else { Control::Go }
+        if shared.stop.load(Relaxed) { Control::Stop } else { Control::Go }
     })
 }
