@@ -45,7 +45,7 @@ pub(super) struct LaneBatch<'a, T: Real, C, A, const W: usize, const H: usize, c
     modes: [Modes<Lanes<T, C, W>, N>; H],
     spans: [Span<Lanes<T, C, W>, N>; H],
     /// Joint states at the start of the last step; `sincos` are sines and cosines at the start, `mode_check` the check of the step's friction modes.
-    starts: [JointState<Lanes<T, C, W>, N>; H],
+    step_start: [JointState<Lanes<T, C, W>, N>; H],
     sincos: [[SinCos<Lanes<T, C, W>>; N]; H],
     mode_check: [ModeCheck<Lanes<T, C, W>, N>; H],
     clocks: [Clock<T, N>; WIDTH],
@@ -80,7 +80,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
             kinematics: [KinematicState::none(); H],
             modes: [Modes::new([zero; N], [zero; N]); H],
             spans: [Span { t: zero, h: zero, tau: [[zero; N]; 3] }; H],
-            starts: [KinematicState::none().joints; H],
+            step_start: [KinematicState::none().joints; H],
             sincos: [KinematicState::none().sincos; H],
             mode_check: [ModeCheck::none(); H],
             clocks: [Clock::new(); WIDTH],
@@ -139,7 +139,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
     fn step_lanes<const EFFECTS: bool, const ANY_STUCK: bool>(&mut self) -> bool {
         let mut right = self.extent != StepExtent::ToReversal;
         for i in 0..H {
-            (self.starts[i], self.sincos[i]) = (self.kinematics[i].joints, self.kinematics[i].sincos);
+            (self.step_start[i], self.sincos[i]) = (self.kinematics[i].joints, self.kinematics[i].sincos);
             let step = FixedModeStep {
                 dynamics: &LaneDynamics::<_, EFFECTS, ANY_STUCK>(&self.plant_lanes[i]),
                 start: &self.kinematics[i],
@@ -157,7 +157,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
         right
     }
 
-    /// Accepts a step in which the friction modes hold in all lanes, and starts the next interval of every lane.
+    /// Accepts a step in which the friction modes hold in all lanes, and step_start the next interval of every lane.
     #[inline(always)]
     fn arrive_all(&mut self, runs: &mut [Run<'a, T, A, N, P>]) {
         if self.extent != StepExtent::Full {
@@ -330,7 +330,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
         if self.clocks[l].is_whole() {
             self.clocks[l].left = interval.h;
         }
-        let (mode_check, start, end) = (&self.mode_check[i], &self.starts[i], &self.kinematics[i]);
+        let (mode_check, start, end) = (&self.mode_check[i], &self.step_start[i], &self.kinematics[i]);
         let PlantLanes { rigid, dry, plants, .. } = &self.plant_lanes[i];
         let lane_step = LaneStep {
             ends: [lane_of(start, lane), lane_of(&end.joints, lane)],

@@ -77,7 +77,7 @@ struct ElasticBatch<'r, 'a, T: Real, C, A, const W: usize, const N: usize, const
     span: ElasticSpan<Lanes<T, C, W>, N>,
     substeps: [Substep<T>; W],
     /// Whether each lane starts a sample interval.
-    starts: [bool; W],
+    at_sample: [bool; W],
     /// Index of the run in each lane; `cursors` has the lane's position in the run, `None` if the lane has ended.
     runs: [usize; W],
     cursors: [Option<RunCursor<'a, T, N>>; W],
@@ -102,7 +102,7 @@ impl<'r, 'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, c
             modes: ElasticModes { direction: [one; N], any_stuck: false },
             span: ElasticSpan { t: zero, h: zero, tau: [[zero; N]; 3] },
             substeps: [Substep { index: 0, count: 1, h: T::zero() }; W],
-            starts: [false; W],
+            at_sample: [false; W],
             runs: [0; W],
             cursors: from_fn(|_| None),
             moving: W,
@@ -118,7 +118,7 @@ impl<'r, 'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, c
     #[inline(always)]
     fn step(&mut self) {
         let kinematics = self.lanes.kinematics(&self.state.joints);
-        if self.starts.contains(&true) {
+        if self.at_sample.contains(&true) {
             let inertia = &kinematics.equation_terms.inertia;
             let mut free = [self.span.h; N];
             for j in 0..N {
@@ -147,10 +147,10 @@ impl<'r, 'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, c
         let plant = self.lanes.plant();
         for l in 0..W {
             let Some(RunCursor { interval: Some(interval), .. }) = &self.cursors[l] else { continue };
-            if !self.starts[l] {
+            if !self.at_sample[l] {
                 continue;
             }
-            self.starts[l] = false;
+            self.at_sample[l] = false;
             let q = SVector::from(lane_values(&self.state.joints.q, l));
             let rate = plant.fastest_with(&q, &lane_values(free, l));
             let count = stable_substeps(interval.h, rate, self.rollout.most_substeps);
@@ -203,7 +203,7 @@ impl<'r, 'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, c
                 if drivetrain.sides(j).encoder_at_motor { q[j] + deflection[j] } else { q[j] }
             }));
             if cursor.interval.is_some() {
-                self.starts[l] = true;
+                self.at_sample[l] = true;
                 return;
             }
         }
@@ -222,7 +222,7 @@ impl<'r, 'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, c
             let state = run.state;
             self.cursors[l] = RunCursor::of(run);
             if self.cursors[l].is_some() {
-                self.starts[l] = true;
+                self.at_sample[l] = true;
                 return self.set(l, &state);
             }
         }
