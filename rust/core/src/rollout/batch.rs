@@ -157,7 +157,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
         right
     }
 
-    /// Accepts a step in which the friction modes hold in all lanes, and step_start the next interval of every lane.
+    /// Accepts a step in which the friction modes hold in all lanes, and starts the next interval of every lane.
     #[inline(always)]
     fn arrive_all(&mut self, runs: &mut [Run<'a, T, A, N, P>]) {
         if self.extent != StepExtent::Full {

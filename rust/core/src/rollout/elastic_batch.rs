@@ -133,7 +133,8 @@ impl<'r, 'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, c
             if self.cursors[l].is_none() {
                 continue;
             }
-            if !(step.violation.0[l] <= T::zero()) {
+            let holds = step.violation.0[l] <= T::zero();
+            if !holds {
                 self.put(l, &start);
                 self.take_alone(l);
             }
@@ -194,8 +195,8 @@ impl<'r, 'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, c
         }
         let JointState { q, dq } = &self.state.joints;
         let (q, dq): ([T; N], [T; N]) = (lane_values(q, l), lane_values(dq, l));
-        let within =
-            q.iter().all(|q| q.abs() <= self.rollout.limit) && dq.iter().all(|dq| (*dq - *dq) == T::zero());
+        let within = q.iter().all(|q| q.abs() <= self.rollout.limit)
+            && dq.iter().all(nalgebra::ComplexField::is_finite);
         if within && let Some(cursor) = &mut self.cursors[l] {
             let drivetrain = self.lanes.plant().drivetrain();
             let deflection: [T; N] = lane_values(&self.state.deflection, l);
