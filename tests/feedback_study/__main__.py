@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-import json
-import os
+import functools
 from pathlib import Path
-from typing import Any
 
 import click
-
-#: What decides how many threads a process takes; each process has one.
-THREADS = ("RAYON_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "POLARS_MAX_THREADS")
 
 
 @click.command(name="python -m tests.feedback_study", context_settings={"max_content_width": 100, "show_default": True})
@@ -25,24 +20,12 @@ THREADS = ("RAYON_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "POLA
 )
 def main(seed: int, runs: int, share: float, *, jobs: int, file: Path | None) -> None:
     """Measure bias and coverage of a serial arm's parameters from logs in closed loop."""
-    os.environ.update(dict.fromkeys(THREADS, "1"))
-    from pebble import ProcessPool
+    from tests.serial_trial.records import collect
 
     from .estimates import ask
     from .report import report
 
-    records: list[dict[str, Any]] = []
-    with ProcessPool(jobs) as pool:
-        tasks = [(number, pool.schedule(ask, args=[seed, number, share])) for number in range(runs)]
-        for number, task in tasks:
-            try:
-                record = task.result()
-            except Exception as error:  # one run that fails must not end the study; it is counted
-                record = {"number": number, "seed": seed, "failed": f"{type(error).__name__}: {error}"}
-            records.append(record)
-            if file is not None:
-                file.write_text("".join(json.dumps(r) + "\n" for r in records))
-            click.echo(f"{len(records)} of {runs}", err=True)
+    records = collect(functools.partial(ask, share=share), seed, range(runs), jobs=jobs, file=file)
     click.echo(report(records))
 
 

@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-import json
-import os
+import functools
 from pathlib import Path
-from typing import Any
 
 import click
-
-#: What decides how many threads a process takes; each process has one.
-THREADS = ("RAYON_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "POLARS_MAX_THREADS")
 
 
 @click.command(name="python -m tests.serial_trial", context_settings={"max_content_width": 100, "show_default": True})
@@ -27,28 +22,13 @@ THREADS = ("RAYON_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "POLA
 )
 def main(seed: int, cases: int, nulls: int, *, commanded: bool, jobs: int, timeout: float, file: Path | None) -> None:
     """Diagnose arms of three to seven joints that a physics engine moves with one hidden effect each."""
-    os.environ.update(dict.fromkeys(THREADS, "1"))
-    from pebble import ProcessPool
-
     from .case import NULLS
+    from .records import collect
     from .run import answer, report
 
     numbers = [*range(cases), *range(NULLS, NULLS + nulls)]
-    records: list[dict[str, Any]] = []
-    with ProcessPool(jobs) as pool:
-        tasks = [
-            (number, pool.schedule(answer, args=[seed, number], kwargs={"commanded": commanded}, timeout=timeout))
-            for number in numbers
-        ]
-        for number, task in tasks:
-            try:
-                record = task.result()
-            except Exception as error:  # one case that fails must not end the run; it is counted
-                record = {"number": number, "seed": seed, "failed": f"{type(error).__name__}: {error}"}
-            records.append(record)
-            if file is not None:
-                file.write_text("".join(json.dumps(r) + "\n" for r in records))
-            click.echo(f"{len(records)} of {len(numbers)}", err=True)
+    ask = functools.partial(answer, commanded=commanded)
+    records = collect(ask, seed, numbers, jobs=jobs, file=file, timeout=timeout)
     click.echo(report(records))
 
 

@@ -1,7 +1,7 @@
 //! Hyperbolic tangent of one number or several side by side, by arithmetic alone.
 //!
-//! The argument is divided by 32 and brought back by five doublings, `tanh 2y = 2 tanh y / (1 + tanh^2 y)`; for the small argument Lambert's continued
-//! fraction is cut off after `y^2/17`, which is off by 1e-21 of the value. Rounding adds a few units in the last place.
+//! The argument is divided by 32 and brought back by five doublings, `tanh 2y = 2 tanh y / (1 + tanh^2 y)`; for the small argument Lambert's
+//! continued fraction is cut off after `y^2/17`, which is off by 1e-20 of the value. Rounding adds a few units in the last place.
 
 use crate::number::Number;
 use crate::real::lit;

@@ -1,13 +1,13 @@
 //! Tests of batch rollouts of plants with elastic joints and regularised friction against the scalar integrator.
 
-use armgap_core::arm::TwoLink;
+use armgap_core::arm::{Pendulum, TwoLink};
 use armgap_core::cpu::Level;
 use armgap_core::effect::{Active, InputSegment, find};
 use armgap_core::integrate::{Interval, State, advance};
 use armgap_core::plant::Plant;
 use armgap_core::rollout::{ElasticRollout, Run, stable_substeps};
 use armgap_core::transmission::Sides;
-use nalgebra::Vector2;
+use nalgebra::{Vector1, Vector2};
 
 const THETA: [f64; 9] = [2.3516, 0.0838, 0.1019, 38.465, 1.827, 2.288, 0.175, 7.6, 1.734];
 const H: f64 = 0.0025;
@@ -171,4 +171,57 @@ fn a_run_that_leaves_the_limit_ends_alone() {
     for run in [0, 1, 3, 4, 6, 7] {
         assert!(out[run].iter().all(|q| q.is_finite()), "run {run}");
     }
+}
+
+/// Positions that an encoder on the motor shows, of a pendulum behind an elastic shaft: the equations in the motor's own position `motor`, in place of a
+/// deflection (Siciliano 2009, section 6.1), by Runge-Kutta in steps of a hundredth of a sample.
+fn elastic_pendulum(
+    [inertia, weight, viscous, coulomb]: [f64; 4],
+    [stiffness, damping, rotor]: [f64; 3],
+    width: f64,
+    torque: impl Fn(f64) -> f64,
+) -> Vec<f64> {
+    let rates = |t: f64, [link, motor, link_speed, motor_speed]: [f64; 4]| {
+        let shaft = stiffness * (motor - link) + damping * (motor_speed - link_speed);
+        let friction = viscous * motor_speed + coulomb * (motor_speed / width).tanh();
+        let of_link = (shaft - weight * link.sin()) / inertia;
+        [link_speed, motor_speed, of_link, (torque(t) - friction - shaft) / rotor]
+    };
+    let ahead = |x: [f64; 4], k: [f64; 4], h: f64| std::array::from_fn(|i| x[i] + h * k[i]);
+    let h = H / 100.0;
+    let (mut x, mut shown) = ([0.3, 0.3, 0.5, 0.5], Vec::new());
+    for k in 0..ROWS * 100 {
+        let t = H * (k / 100) as f64;
+        let k1 = rates(t, x);
+        let k2 = rates(t, ahead(x, k1, h / 2.0));
+        let k3 = rates(t, ahead(x, k2, h / 2.0));
+        let k4 = rates(t, ahead(x, k3, h));
+        x = std::array::from_fn(|i| x[i] + h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]));
+        if k % 100 == 99 {
+            shown.push(x[1]);
+        }
+    }
+    shown
+}
+
+#[test]
+fn an_elastic_pendulum_obeys_the_equations_in_its_motors_position() {
+    let (theta, shaft, width) = ([0.5, 3.0, 0.1, 0.4], [60.0, 0.2, 0.05], 0.5);
+    let law = find::<f64>("joint_elasticity").expect("in the catalogue");
+    let plant = Plant::new(Pendulum { gravity: 9.81 }, theta)
+        .with_effect(Active { law, joint: 0, p: shaft })
+        .and_then(|plant| plant.with_sides(0, Sides::MOTOR))
+        .expect("a joint of the pendulum")
+        .with_rounding([width]);
+    let torque = |t: f64| 6.0 * (9.0 * t).sin();
+    let t: Vec<f64> = (0..=ROWS).map(|k| H * k as f64).collect();
+    let held: Vec<_> = t.iter().map(|t| [InputSegment::held(torque(*t))]).collect();
+    let mut positions = vec![f64::NAN; ROWS];
+    let state = State::new(Vector1::new(0.3), Vector1::new(0.5));
+    let run = Run { plant: &plant, t: &t, torque: &held[..ROWS], state, positions: &mut positions };
+    ElasticRollout { runs: &mut [run], limit: 1e3, most_substeps: MOST }.run_all(Level::widest());
+    let expected = elastic_pendulum(theta, shaft, width, torque);
+    let most = positions.iter().zip(&expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    let travel = expected.iter().fold(0.0_f64, |most, q| most.max((q - 0.3).abs()));
+    assert!(most < 1e-6 && travel > 0.3, "{most:e} of {travel}");
 }

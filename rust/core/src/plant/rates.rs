@@ -56,7 +56,8 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         self.fastest_with(q, &core::array::from_fn(|j| free_inertia(&inertia, j)))
     }
 
-    /// Fastest rate of the plant at the positions `q`, 1/s, as [`Plant::fastest`] has it, given each joint's inertia with all other joints free to move, `free`.
+    /// Fastest rate of the plant at the positions `q`, 1/s, as [`Plant::fastest`] has it; `free` is each joint's inertia with all other joints free to
+    /// move, kg m^2 (kg).
     #[inline]
     pub(crate) fn fastest_with(&self, q: &SVector<T, N>, free: &[T; N]) -> T {
         let mut fastest = T::zero();

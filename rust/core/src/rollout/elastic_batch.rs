@@ -1,7 +1,7 @@
 //! Batch rollouts of one plant with elastic joints or regularised friction: one run in each lane of a vector unit.
 //!
-//! Every lane divides its sample intervals into as many steps as keep Runge-Kutta stable. A step in which the friction mode of a joint changes is left to the
-//! scalar integrator ([`crate::integrate`]), in its lane alone.
+//! Every lane divides its sample intervals into as many steps as keep Runge-Kutta stable. A step in which the friction mode of a joint changes is
+//! left to the scalar integrator ([`crate::integrate`]), in its lane alone.
 
 use super::cursor::{RunCursor, lane_values};
 use super::elastic_lanes::{ElasticLanes, ElasticModes, ElasticSpan, ElasticState};
@@ -27,8 +27,8 @@ pub fn stable_substeps<T: Real>(h: T, rate: T, most: usize) -> usize {
     (1..most).find(|count| needed <= lit(*count as f64)).unwrap_or(most.max(1))
 }
 
-/// Batch of runs of one plant ([`crate::plant::Plant::is_elastic_or_regularised`]), simulated [`WIDTH`] at a time; a run ends where a joint position exceeds
-/// `limit`, rad or m, or is NaN. Positions are those that the encoders show.
+/// Batch of runs of one plant ([`crate::plant::Plant::is_elastic_or_regularised`]), simulated [`WIDTH`] at a time; a run ends where a joint position
+/// exceeds `limit`, rad or m, or is NaN. The positions of the runs are those that the encoders show.
 pub struct ElasticRollout<'r, 'a, T: Real, A, const N: usize, const P: usize> {
     /// Runs of the batch, all of the same plant.
     pub runs: &'r mut [Run<'a, T, A, N, P>],

@@ -1,7 +1,7 @@
 //! Dynamics of one plant with elastic joints, regularised friction, or both, in several runs side by side.
 //!
-//! The equations are those of [`Plant::acceleration`], with one run in each lane: the friction of a joint acts on its link or on its motor, is a smooth
-//! function of velocity where it is regularised, and elsewhere has the direction of its friction mode throughout a step.
+//! The equations are those of [`Plant::acceleration`], with one run in each lane: the friction of a joint acts on its link or on its motor, is a
+//! smooth function of velocity where it is regularised, and elsewhere has the direction of its friction mode throughout a step.
 
 use super::plant_lanes::{JointInstant, PlantLanes};
 use crate::arm::Arm;
@@ -68,10 +68,13 @@ struct Shaft<V, const N: usize> {
 /// Motion at one Runge-Kutta stage.
 #[derive(Clone, Copy)]
 struct StageMotion<V, const N: usize> {
+    /// Joint accelerations, rad/s^2 (m/s^2).
     ddq: [V; N],
+    /// Accelerations of the shafts' deflections, rad/s^2 (m/s^2).
     deflection_acceleration: [V; N],
-    /// Friction torque that keeps a stuck joint or motor at rest, and the torque of the motor on which it acts, N m (N); meaningless if none is stuck.
+    /// Friction torque that keeps each stuck joint or motor at rest, N m (N); meaningless if none is stuck.
     friction_at_rest: [V; N],
+    /// Torque that reaches each joint through its shaft, or the motor's torque where friction acts on the motor, N m (N).
     reaching: [V; N],
 }
 
@@ -133,7 +136,8 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, const
         if self.at_motor[j] { state.joints.dq[j] + state.deflection_rate[j] } else { state.joints.dq[j] }
     }
 
-    /// Direction of the dry friction of joint `j` at the velocity `dq`, rad/s or m/s: that of its mode, or a smooth function of `dq` between -1 and 1.
+    /// Direction of the dry friction of joint `j` at the velocity `dq`, rad/s or m/s: that of its friction mode, or a smooth function of `dq` between
+    /// -1 and 1 where friction is regularised.
     #[inline(always)]
     fn sliding(
         &self,
@@ -180,7 +184,9 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, const
         let (mut slides, mut sliding, mut transmitted) = ([one; N], [zero; N], [zero; N]);
         for j in 0..N {
             slides[j] = modes.direction[j] * modes.direction[j];
-            sliding[j] = self.sliding(j, dq[j], modes);
+            if self.has_effects || !self.at_motor[j] {
+                sliding[j] = self.sliding(j, dq[j], modes);
+            }
             if let Some(shaft) = &self.shafts[j] {
                 transmitted[j] =
                     shaft.stiffness.fused(state.deflection[j], shaft.damping * state.deflection_rate[j]);

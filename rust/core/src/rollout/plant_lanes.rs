@@ -93,8 +93,8 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, const
         rigid.tilt.0[l] = own.tilt;
     }
 
-    /// Coulomb level of joint `j` in the lanes where it slides, in `direction`, and torque of the effects on joint `j`, N m (N); `other` is the direction in
-    /// which the next joint slides.
+    /// Coulomb level of joint `j` in the lanes where it slides, in `direction`, and torque of the effects on joint `j`, N m (N); `other` is the
+    /// direction in which the next joint slides.
     #[inline(never)]
     pub(super) fn laws(
         &self,

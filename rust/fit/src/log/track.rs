@@ -55,8 +55,9 @@ pub struct Track<const N: usize> {
     /// Acceleration by which the torque drives each joint from sample to sample, `M(q)^-1 tau`; `None` for a joint whose measured motion is no
     /// smoother without it.
     driven: [Option<Vec<f64>>; N],
-    /// Smoothed motion, computed at first use.
+    /// Median sample period, s, computed at first use.
     period: OnceLock<f64>,
+    /// Smoothed motion, computed at first use.
     path: OnceLock<Vec<MeasuredState<N>>>,
     /// Local cubics at all samples, computed at first use.
     smoothed: OnceLock<Vec<[Smoothed; N]>>,
