@@ -101,7 +101,7 @@ pub fn advance<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize>(
 }
 
 /// Advances `state` over a part of a sample interval, `dt` seconds from `from` seconds after the sample.
-#[inline(never)]
+#[inline]
 pub(crate) fn substep<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize>(
     plant: &Plant<T, A, N, P>,
     state: &mut State<T, N>,
