@@ -52,7 +52,7 @@ fn nearby<const N: usize>(
     found.filter(|(_, reached)| *reached < least).unwrap_or(best)
 }
 
-/// Widths of least cost: the best of `tried` on all joints, then a common width near it, then one for each joint; none is less than the joint's
+/// Widths of least cost: the best of `tried`, in order, on all joints, then a common width near it, then one for each joint; none is less than the joint's
 /// `narrowest`.
 fn least_widths<const N: usize>(
     cost: impl Fn([f64; N]) -> f64,
@@ -61,6 +61,9 @@ fn least_widths<const N: usize>(
 ) -> Option<Widths<N>> {
     let within = |widths: [f64; N]| std::array::from_fn(|j| widths[j].max(narrowest[j]));
     let cost = |widths: [f64; N]| cost(within(widths));
+    let least = narrowest.into_iter().fold(f64::INFINITY, f64::min);
+    let mut tried: Vec<f64> = tried.into_iter().map(|width| width.max(least)).collect();
+    tried.dedup();
     let mut best = tried
         .into_iter()
         .map(|width| ([width; N], cost([width; N])))
