@@ -121,7 +121,6 @@ impl<'r, 'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, c
             } else if self.divisions[l].needs_sliding() && step.slowing.0[l] > T::zero() {
                 self.put(l, &start);
                 self.refine(l);
-                continue;
             } else {
                 self.arrive(l);
             }

@@ -92,6 +92,35 @@ fn refined_widths<const N: usize>(
     (within(best.0), best.1)
 }
 
+/// Narrowest widths of friction regularisation by joint, rad/s or m/s, with which the steps of predictions are stable at the start of every window.
+fn narrowest_widths<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    problem: &FitProblem<A, N, P>,
+    model: &Hypothesis<P>,
+) -> Option<[f64; N]> {
+    let plant = model.rounded_over([1.0; N]).plant(problem.arm)?;
+    let mut narrowest = [0.0_f64; N];
+    for window in &problem.data.windows {
+        let rate = largest_stable_rate(problem.data.tracks[window.track].period(), MAX_SUBSTEPS_FRICTION);
+        for (most, width) in narrowest.iter_mut().zip(plant.widths_at_rate(&window.initial_state.q, rate)) {
+            *most = most.max(width);
+        }
+    }
+    Some(narrowest)
+}
+
+/// The model with its widths of friction regularisation refined; none where this does no better.
+fn with_refined_widths<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    problem: &FitProblem<A, N, P>,
+    model: &Hypothesis<P>,
+    jacobian: &[Vec<f64>],
+) -> Option<Hypothesis<P>> {
+    let narrowest = narrowest_widths(problem, model)?;
+    let cost = |widths: [f64; N]| problem.cost_refitted(&model.rounded_over(widths), jacobian);
+    let own = std::array::from_fn(|j| model.rounding[j]);
+    let (widths, least) = refined_widths(cost, own, narrowest);
+    (least < cost(own)).then(|| model.rounded_over(widths))
+}
+
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
     /// The model with the widths of friction regularisation that suit the training windows best, its values estimated again to first order from its
     /// `jacobian`; none where no width does better than the model's own.
@@ -101,39 +130,12 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         model: &Hypothesis<P>,
         jacobian: &[Vec<f64>],
     ) -> Option<Hypothesis<P>> {
-        let narrowest = self.narrowest_widths(problem, model)?;
+        let narrowest = narrowest_widths(problem, model)?;
         let cost = |widths: [f64; N]| problem.cost_refitted(&model.rounded_over(widths), jacobian);
         let now = problem.cost_refitted(model, jacobian);
         let slowest = self.scales.slowest();
         let (widths, least) = least_widths(cost, WIDTHS.map(|part| part * slowest), narrowest)?;
         (least < now).then(|| model.rounded_over(widths))
-    }
-
-    /// The model with its widths of friction regularisation refined; none where this does no better.
-    fn with_refined_widths(
-        &self,
-        problem: &FitProblem<A, N, P>,
-        model: &Hypothesis<P>,
-        jacobian: &[Vec<f64>],
-    ) -> Option<Hypothesis<P>> {
-        let narrowest = self.narrowest_widths(problem, model)?;
-        let cost = |widths: [f64; N]| problem.cost_refitted(&model.rounded_over(widths), jacobian);
-        let own = std::array::from_fn(|j| model.rounding[j]);
-        let (widths, least) = refined_widths(cost, own, narrowest);
-        (least < cost(own)).then(|| model.rounded_over(widths))
-    }
-
-    /// Narrowest widths of friction regularisation by joint, rad/s or m/s, with which the steps of predictions are stable at the start of every window.
-    fn narrowest_widths(&self, problem: &FitProblem<A, N, P>, model: &Hypothesis<P>) -> Option<[f64; N]> {
-        let plant = model.rounded_over([1.0; N]).plant(problem.arm)?;
-        let mut narrowest = [0.0_f64; N];
-        for window in &problem.data.windows {
-            let rate = largest_stable_rate(problem.data.tracks[window.track].period(), MAX_SUBSTEPS_FRICTION);
-            for (most, width) in narrowest.iter_mut().zip(plant.widths_at_rate(&window.initial_state.q, rate)) {
-                *most = most.max(width);
-            }
-        }
-        Some(narrowest)
     }
 
     /// Alternatives to a model: with the widths of friction regularisation that suit it best, and with dry friction if the model's friction is
@@ -186,7 +188,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let cost = |of: &Candidate<P>| of.fit.data_cost + of.fit.prior_cost;
         for _ in 0..ROUNDS {
             let model = &best.fit.hypothesis;
-            let Some(refined) = self.with_refined_widths(&problem, model, &problem.jacobian(model)) else {
+            let Some(refined) = with_refined_widths(&problem, model, &problem.jacobian(model)) else {
                 break;
             };
             let found = self.candidate(&node.weights, &refined, model.effects.len(), Effort::FULL, &[]);
