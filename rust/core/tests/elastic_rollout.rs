@@ -3,9 +3,9 @@
 use armgap_core::arm::{Pendulum, TwoLink};
 use armgap_core::cpu::Level;
 use armgap_core::effect::{Active, InputSegment, find};
-use armgap_core::integrate::{Interval, State, advance};
+use armgap_core::integrate::{Interval, State, StepLimits, advance, advance_in_stable_steps};
 use armgap_core::plant::Plant;
-use armgap_core::rollout::{ElasticRollout, Run, stable_substeps};
+use armgap_core::rollout::{ElasticRollout, Run};
 use armgap_core::transmission::Sides;
 use nalgebra::{Vector1, Vector2};
 
@@ -13,7 +13,7 @@ const THETA: [f64; 9] = [2.3516, 0.0838, 0.1019, 38.465, 1.827, 2.288, 0.175, 7.
 const H: f64 = 0.0025;
 const ROWS: usize = 300;
 const RUNS: usize = 19;
-const MOST: usize = 5;
+const LIMITS: StepLimits = StepLimits { near_standstill: 16, elsewhere: 5 };
 
 type Arm = Plant<f64, TwoLink<f64>, 2, 9>;
 
@@ -68,8 +68,8 @@ fn alone(plant: &Arm, run: usize) -> Vec<f64> {
     let mut shown = Vec::new();
     for k in 0..rows(run) {
         let h = t[k + 1] - t[k];
-        let steps = stable_substeps(h, plant.fastest(&state.q), MOST);
-        advance(plant, &mut state, &Interval { t: t[k], h, torque: &torque[k] }, steps);
+        let (interval, rates) = (Interval { t: t[k], h, torque: &torque[k] }, plant.step_rates(&state.q));
+        advance_in_stable_steps(plant, &mut state, &interval, &rates, LIMITS);
         shown.extend(plant.drivetrain().shown(&state.q, &state.latent).iter());
     }
     shown
@@ -90,7 +90,7 @@ fn distance(plant: &Arm, level: Level) -> f64 {
             positions: &mut positions[..2 * rows(run)],
         })
         .collect();
-    ElasticRollout { runs: &mut runs, limit: 1e3, most_substeps: MOST }.run_all(level);
+    ElasticRollout { runs: &mut runs, limit: 1e3, step_limits: LIMITS }.run_all(level);
     let mut most = 0.0_f64;
     for (run, positions) in out.iter().enumerate() {
         let apart = positions.iter().zip(alone(plant, run)).map(|(a, b)| (a - b).abs());
@@ -117,7 +117,7 @@ const SIDES: [Sides; 4] = [
 
 #[test]
 fn regularised_friction_in_lanes_is_that_of_one_run() {
-    for widths in [[0.05, 0.2], [0.02, 0.0], [0.0, 0.1]] {
+    for widths in [[0.05, 0.2], [0.02, 0.0], [0.0, 0.1], [0.005, 0.012]] {
         assert_same(&arm().with_rounding(widths), "regularised");
     }
 }
@@ -165,7 +165,7 @@ fn a_run_that_leaves_the_limit_ends_alone() {
         .zip(&torques)
         .map(|(positions, torque)| Run { plant: &plant, t: &t, torque, state: start(1), positions })
         .collect();
-    ElasticRollout { runs: &mut runs, limit: 1e3, most_substeps: MOST }.run_all(Level::widest());
+    ElasticRollout { runs: &mut runs, limit: 1e3, step_limits: LIMITS }.run_all(Level::widest());
     assert!(out[2][99].is_finite() && out[2][100].is_nan());
     assert!(out[5][2 * ROWS - 1].is_nan(), "what is thrown off goes on");
     for run in [0, 1, 3, 4, 6, 7] {
@@ -219,9 +219,29 @@ fn an_elastic_pendulum_obeys_the_equations_in_its_motors_position() {
     let mut positions = vec![f64::NAN; ROWS];
     let state = State::new(Vector1::new(0.3), Vector1::new(0.5));
     let run = Run { plant: &plant, t: &t, torque: &held[..ROWS], state, positions: &mut positions };
-    ElasticRollout { runs: &mut [run], limit: 1e3, most_substeps: MOST }.run_all(Level::widest());
+    ElasticRollout { runs: &mut [run], limit: 1e3, step_limits: LIMITS }.run_all(Level::widest());
     let expected = elastic_pendulum(theta, shaft, width, torque);
     let most = positions.iter().zip(&expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     let travel = expected.iter().fold(0.0_f64, |most, q| most.max((q - 0.3).abs()));
     assert!(most < 1e-6 && travel > 0.3, "{most:e} of {travel}");
+}
+
+#[test]
+fn friction_over_narrow_widths_is_stable_near_standstill() {
+    let t = times();
+    for widths in [[0.005, 0.012], [0.01, 0.02], [0.02, 0.03], [0.02, 0.0], [0.05, 0.1], [0.002, 0.004]] {
+        let plant = arm().with_rounding(widths);
+        let (mut worst, mut travel) = (0.0_f64, 0.0_f64);
+        for run in 1..8 {
+            let (torque, mut fine) = (torques(run), start(run));
+            let begin = fine.q;
+            for (k, shown) in alone(&plant, run).chunks_exact(2).enumerate() {
+                let interval = Interval { t: t[k], h: t[k + 1] - t[k], torque: &torque[k] };
+                advance(&plant, &mut fine, &interval, 400);
+                worst = worst.max((shown[0] - fine.q[0]).abs().max((shown[1] - fine.q[1]).abs()));
+                travel = travel.max((fine.q - begin).amax());
+            }
+        }
+        assert!(worst < 3e-6 && travel > 0.3, "{widths:?}: {worst:e} of {travel}");
+    }
 }

@@ -8,6 +8,7 @@
 
 mod backlash;
 mod crossing;
+mod division;
 pub(crate) mod root;
 mod settle;
 
@@ -19,6 +20,8 @@ use crate::plant::{Accelerations, Mode, Plant};
 use crate::real::{Real, lit};
 use crate::transmission::LatentState;
 use crossing::{Located, TrialStep};
+pub(crate) use division::{Division, keep_sliding};
+pub use division::{StepLimits, advance_in_stable_steps, largest_stable_rate};
 use nalgebra::SVector;
 
 /// Largest number of events located within one step, after which crossing joints are stopped and the rest of the step is taken: 8 per joint, at least

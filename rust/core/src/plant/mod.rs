@@ -8,6 +8,9 @@ mod dynamics;
 mod laws;
 mod rates;
 
+pub(crate) use rates::SLIDING;
+pub use rates::StepRates;
+
 use crate::arm::{Arm, EquationTerms};
 use crate::drivetrain::Drivetrain;
 use crate::effect::{Active, Hooks};

@@ -6,10 +6,31 @@ use crate::effect::Edge;
 use crate::kinematics::JointState;
 use crate::linear::free_inertia;
 use crate::real::{Real, lit};
+use crate::transmission::LatentState;
 use nalgebra::SVector;
 
 /// Factor by which steps during an impact are shorter than stability of the integration needs, to resolve the impact.
 const FOLLOWED: f64 = 4.0;
+
+/// Velocity, in widths of a joint's friction regularisation, beyond which the joint slides: 1 - tanh(6) = 1.2e-5.
+pub(crate) const SLIDING: f64 = 6.0;
+
+/// Rates of a plant that need short integration steps, 1/s.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StepRates<T> {
+    /// Rate at which regularised friction stops a joint near standstill.
+    pub friction: T,
+    /// Rate at which a motor oscillates against its link, or a joint meets a joint limit, as an impact that is to be resolved.
+    pub elsewhere: T,
+}
+
+impl<T: Real> StepRates<T> {
+    /// The larger rates of two.
+    #[must_use]
+    pub fn max(self, other: Self) -> Self {
+        Self { friction: self.friction.max(other.friction), elsewhere: self.elsewhere.max(other.elsewhere) }
+    }
+}
 
 impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P> {
     /// Whether the torque of any joint jumps at a position.
@@ -45,40 +66,74 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         })
     }
 
-    /// Fastest rate of the plant at the positions `q`, 1/s: at which smoothed friction stops a joint, a motor oscillates against its link, or a joint
-    /// meets a joint limit, as an impact that is to be resolved. Zero for a rigid arm with exact friction.
+    /// Fastest rate of the plant at the positions `q`, 1/s: the larger of its [`Plant::step_rates`].
     pub fn fastest(&self, q: &SVector<T, N>) -> T {
-        let behind = self.jumps && (0..N).any(|j| self.edges(j).any(|edge| edge.is_behind(q[j])));
-        if !(0..N).any(|j| self.is_rounded(j)) && !self.drivetrain.any() && !behind {
-            return T::zero();
-        }
-        let inertia = self.rigid.equation_terms(&JointState { q: (*q).into(), dq: [T::zero(); N] }).inertia;
-        self.fastest_with(q, &core::array::from_fn(|j| free_inertia(&inertia, j)))
+        let StepRates { friction, elsewhere } = self.step_rates(q);
+        friction.max(elsewhere)
     }
 
-    /// Fastest rate of the plant at the positions `q`, 1/s, as [`Plant::fastest`] has it; `free` is each joint's inertia with all other joints free to
-    /// move, kg m^2 (kg).
+    /// Rates of the plant at the positions `q` that need short steps. Zero for a rigid arm with exact friction.
+    pub fn step_rates(&self, q: &SVector<T, N>) -> StepRates<T> {
+        let behind = self.jumps && (0..N).any(|j| self.edges(j).any(|edge| edge.is_behind(q[j])));
+        if !(0..N).any(|j| self.is_rounded(j)) && !self.drivetrain.any() && !behind {
+            return StepRates { friction: T::zero(), elsewhere: T::zero() };
+        }
+        let inertia = self.rigid.equation_terms(&JointState { q: (*q).into(), dq: [T::zero(); N] }).inertia;
+        self.step_rates_with(q, &core::array::from_fn(|j| free_inertia(&inertia, j)))
+    }
+
+    /// Rates of the plant at the positions `q`, as [`Plant::step_rates`] has them; `free` is each joint's inertia with all other joints free to move,
+    /// kg m^2 (kg).
     #[inline]
-    pub(crate) fn fastest_with(&self, q: &SVector<T, N>, free: &[T; N]) -> T {
-        let mut fastest = T::zero();
+    pub(crate) fn step_rates_with(&self, q: &SVector<T, N>, free: &[T; N]) -> StepRates<T> {
+        let (mut friction, mut elsewhere) = (T::zero(), T::zero());
         for j in 0..N {
+            friction = friction.max(self.friction_rate(j, q[j], free[j]));
             let free = free[j].max(lit(1e-9));
-            if self.is_rounded(j) {
-                let x = self.point(j, T::zero(), q[j], T::zero(), T::zero(), T::zero());
-                let braked = match self.drivetrain.get(j) {
-                    Some(transmission) if self.drivetrain.sides(j).friction_at_motor => transmission.inertia,
-                    _ => free,
-                };
-                fastest = fastest.max(self.level(j, &x, T::one()) / (self.rounding[j] * braked));
-            }
             if let Some(transmission) = self.drivetrain.get(j).filter(|d| d.backlash <= T::zero()) {
-                fastest = fastest.max(transmission.rate(free));
+                elsewhere = elsewhere.max(transmission.rate(free));
             }
             if self.jumps {
                 let met = self.edges(j).filter(|edge| edge.is_behind(q[j]));
-                fastest = met.fold(fastest, |rate, edge| rate.max(edge.rate(free) * lit(FOLLOWED)));
+                elsewhere = met.fold(elsewhere, |rate, edge| rate.max(edge.rate(free) * lit(FOLLOWED)));
             }
         }
-        fastest
+        StepRates { friction, elsewhere }
+    }
+
+    /// Rate at which regularised friction stops joint `j`, 1/s, near standstill at the position `q`, rad (m); `free` is the joint's inertia with all other
+    /// joints free to move, kg m^2 (kg). Zero for exact friction.
+    fn friction_rate(&self, j: usize, q: T, free: T) -> T {
+        if !self.is_rounded(j) {
+            return T::zero();
+        }
+        let x = self.point(j, T::zero(), q, T::zero(), T::zero(), T::zero());
+        let braked = match self.drivetrain.get(j) {
+            Some(transmission) if self.drivetrain.sides(j).friction_at_motor => transmission.inertia,
+            _ => free.max(lit(1e-9)),
+        };
+        self.level(j, &x, T::one()) / (self.rounding[j] * braked)
+    }
+
+    /// Width of friction regularisation of each joint, rad/s (m/s), with which friction stops the joint near standstill at the rate `rate`, 1/s, at the
+    /// positions `q`. Zero for exact friction.
+    pub fn widths_at_rate(&self, q: &SVector<T, N>, rate: T) -> [T; N] {
+        let inertia = self.rigid.equation_terms(&JointState { q: (*q).into(), dq: [T::zero(); N] }).inertia;
+        core::array::from_fn(|j| {
+            self.rounding[j] * self.friction_rate(j, q[j], free_inertia(&inertia, j)) / rate
+        })
+    }
+
+    /// Whether the regularised friction of joint `j` differs from Coulomb's at the velocity `dq`, rad/s (m/s), by no more than a part in 10^5; true for
+    /// exact friction.
+    #[inline]
+    pub(crate) fn slides(&self, j: usize, dq: T) -> bool {
+        dq.abs() > self.rounding[j] * lit(SLIDING) || !self.is_rounded(j)
+    }
+
+    /// Whether all joints with regularised friction slide ([`Plant::slides`]).
+    #[inline]
+    pub(crate) fn all_slide(&self, dq: &SVector<T, N>, latent: &LatentState<T, N>) -> bool {
+        (0..N).all(|j| self.slides(j, self.friction_velocity(j, dq, latent)))
     }
 }

@@ -1,14 +1,14 @@
 //! Batch rollouts of one plant with elastic joints or regularised friction: one run in each lane of a vector unit.
 //!
-//! Every lane divides its sample intervals into as many steps as keep Runge-Kutta stable. A step in which the friction mode of a joint changes is
-//! left to the scalar integrator ([`crate::integrate`]), in its lane alone.
+//! Every lane divides its sample intervals into as many steps as keep Runge-Kutta stable, as [`crate::integrate::advance_in_stable_steps`] does. A step
+//! in which the friction mode of a joint changes is left to the scalar integrator ([`crate::integrate`]), in its lane alone.
 
 use super::cursor::{RunCursor, lane_values};
 use super::elastic_lanes::{ElasticLanes, ElasticModes, ElasticSpan, ElasticState};
 use super::{Run, WIDTH};
 use crate::arm::Arm;
 use crate::cpu::{Cpu, Kernel, Level};
-use crate::integrate::{State, substep};
+use crate::integrate::{Division, State, StepLimits, keep_sliding, substep};
 use crate::kinematics::JointState;
 use crate::lanes::Lanes;
 use crate::linear::free_inertia;
@@ -18,15 +18,6 @@ use crate::real::{Real, lit};
 use core::array::from_fn;
 use nalgebra::SVector;
 
-/// Product of a step's length and the plant's fastest rate up to which a step is taken.
-const STABLE: f64 = 1.5;
-
-/// Number of steps of `h` seconds that keep Runge-Kutta stable with the plant's fastest rate, 1/s; at least 1, at most `most`.
-pub fn stable_substeps<T: Real>(h: T, rate: T, most: usize) -> usize {
-    let needed = h * rate / lit(STABLE);
-    (1..most).find(|count| needed <= lit(*count as f64)).unwrap_or(most.max(1))
-}
-
 /// Batch of runs of one plant ([`crate::plant::Plant::is_elastic_or_regularised`]), simulated [`WIDTH`] at a time; a run ends where a joint position
 /// exceeds `limit`, rad or m, or is NaN. The positions of the runs are those that the encoders show.
 pub struct ElasticRollout<'r, 'a, T: Real, A, const N: usize, const P: usize> {
@@ -34,8 +25,8 @@ pub struct ElasticRollout<'r, 'a, T: Real, A, const N: usize, const P: usize> {
     pub runs: &'r mut [Run<'a, T, A, N, P>],
     /// Largest size of a joint position, rad or m, beyond which a run ends.
     pub limit: T,
-    /// Largest number of steps in one sample interval.
-    pub most_substeps: usize,
+    /// Largest numbers of steps in one sample interval.
+    pub step_limits: StepLimits,
 }
 
 impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> ElasticRollout<'_, '_, T, A, N, P> {
@@ -57,17 +48,6 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Kernel for Elasti
     }
 }
 
-/// Part of a sample interval that a lane takes in its next step.
-#[derive(Debug, Clone, Copy)]
-struct Substep<T> {
-    /// Number of the step within its interval, from 0.
-    index: usize,
-    /// Number of steps in the interval.
-    count: usize,
-    /// Length of the step, s.
-    h: T,
-}
-
 /// State of all lanes of a batch.
 struct ElasticBatch<'r, 'a, T: Real, C, A, const W: usize, const N: usize, const P: usize> {
     rollout: ElasticRollout<'r, 'a, T, A, N, P>,
@@ -75,7 +55,8 @@ struct ElasticBatch<'r, 'a, T: Real, C, A, const W: usize, const N: usize, const
     state: ElasticState<Lanes<T, C, W>, N>,
     modes: ElasticModes<Lanes<T, C, W>, N>,
     span: ElasticSpan<Lanes<T, C, W>, N>,
-    substeps: [Substep<T>; W],
+    /// Division of each lane's sample interval.
+    divisions: [Division<T>; W],
     /// Whether each lane starts a sample interval.
     at_sample: [bool; W],
     /// Index of the run in each lane; `cursors` has the lane's position in the run, `None` if the lane has ended.
@@ -101,7 +82,7 @@ impl<'r, 'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, c
             state: ElasticState { joints, deflection: [zero; N], deflection_rate: [zero; N] },
             modes: ElasticModes { direction: [one; N], any_stuck: false },
             span: ElasticSpan { t: zero, h: zero, tau: [[zero; N]; 3] },
-            substeps: [Substep { index: 0, count: 1, h: T::zero() }; W],
+            divisions: [Division::empty(); W],
             at_sample: [false; W],
             runs: [0; W],
             cursors: from_fn(|_| None),
@@ -137,8 +118,12 @@ impl<'r, 'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, c
             if !holds {
                 self.put(l, &start);
                 self.take_alone(l);
+            } else if self.divisions[l].needs_sliding() && step.slowing.0[l] > T::zero() {
+                self.put(l, &start);
+                self.refine(l);
+            } else {
+                self.arrive(l);
             }
-            self.arrive(l);
         }
     }
 
@@ -152,10 +137,10 @@ impl<'r, 'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, c
                 continue;
             }
             self.at_sample[l] = false;
-            let q = SVector::from(lane_values(&self.state.joints.q, l));
-            let rate = plant.fastest_with(&q, &lane_values(free, l));
-            let count = stable_substeps(interval.h, rate, self.rollout.most_substeps);
-            self.substeps[l] = Substep { index: 0, count, h: interval.h / lit(count as f64) };
+            let state = self.state_of(l);
+            let rates = plant.step_rates_with(&state.q, &lane_values(free, l));
+            let all_slide = plant.all_slide(&state.dq, &state.latent);
+            self.divisions[l] = Division::new(interval.h, &rates, self.rollout.step_limits, all_slide);
             self.set_span(l);
         }
     }
@@ -164,8 +149,7 @@ impl<'r, 'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, c
     #[inline]
     fn set_span(&mut self, l: usize) {
         let Some(RunCursor { interval: Some(interval), .. }) = &self.cursors[l] else { return };
-        let Substep { index, h, .. } = self.substeps[l];
-        let from = h * lit(index as f64);
+        let (from, h) = (self.divisions[l].from(), self.divisions[l].h);
         (self.span.t.0[l], self.span.h.0[l]) = (interval.t + from, h);
         for (i, part) in [T::zero(), lit(0.5), T::one()].into_iter().enumerate() {
             let tau = interval.torque_at(from + h * part);
@@ -175,22 +159,32 @@ impl<'r, 'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, c
         }
     }
 
+    /// Divides the rest of the interval of lane `l` into steps for a joint near standstill.
+    #[inline(never)]
+    fn refine(&mut self, l: usize) {
+        self.divisions[l].refine();
+        self.set_span(l);
+    }
+
     /// Takes the step of lane `l` with the scalar integrator.
     #[inline(never)]
     fn take_alone(&mut self, l: usize) {
         let Some(RunCursor { interval: Some(interval), .. }) = &self.cursors[l] else { return };
-        let Substep { index, h, .. } = self.substeps[l];
-        let mut state = self.state_of(l);
-        substep(self.lanes.plant(), &mut state, interval, h * lit(index as f64), h);
+        let (plant, division) = (self.lanes.plant(), self.divisions[l]);
+        let start = self.state_of(l);
+        let mut state = start;
+        substep(plant, &mut state, interval, division.from(), division.h);
+        if division.needs_sliding() && !keep_sliding(plant, &start, &state) {
+            return self.refine(l);
+        }
         self.set(l, &state);
+        self.arrive(l);
     }
 
     /// Ends the step of lane `l`: the next step of its interval, the next interval or the next run follows.
     #[inline]
     fn arrive(&mut self, l: usize) {
-        let Substep { index, count, .. } = &mut self.substeps[l];
-        *index += 1;
-        if *index < *count {
+        if self.divisions[l].next() {
             return self.set_span(l);
         }
         let JointState { q, dq } = &self.state.joints;

@@ -12,7 +12,7 @@ use crate::kinematics::{AngleRange, JointState, KinematicState, rotated};
 use crate::lanes::Lanes;
 use crate::linear::solve_positive_definite;
 use crate::number::Number;
-use crate::plant::Plant;
+use crate::plant::{Plant, SLIDING};
 use crate::real::{Real, lit};
 use core::array::from_fn;
 
@@ -52,6 +52,8 @@ pub(super) struct ElasticStep<V, const N: usize> {
     pub(super) end: ElasticState<V, N>,
     /// > 0 or NaN where friction modes contradict the motion, or where the motion is not finite or turns the arm beyond the angle range of a step.
     pub(super) violation: V,
+    /// > 0 where a joint with regularised friction does not slide at the end in the direction in which it moves at the start.
+    pub(super) slowing: V,
 }
 
 /// Shaft between motor and link of an elastic joint, the same in all lanes.
@@ -369,10 +371,17 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, const
         for j in (0..N).filter(|j| self.is_dry[*j] && self.inverse_width[*j].is_none()) {
             violation = violation.larger(-(self.friction_velocity(j, &end) * modes.direction[j]));
         }
+        let mut slowing = -c(1.0);
+        for j in 0..N {
+            if let Some(inverse_width) = self.inverse_width[j] {
+                let ahead = self.friction_velocity(j, &end) * sign(self.friction_velocity(j, start));
+                slowing = slowing.larger(c(SLIDING) - ahead * inverse_width);
+            }
+        }
         // Motion that is not finite leaves its mark in this.
         let finite = total * c(0.0);
         let far = AngleRange::Near.part(far) - c(1.0);
-        ElasticStep { end, violation: violation.larger(far) + finite }
+        ElasticStep { end, violation: violation.larger(far) + finite, slowing }
     }
 
     /// > 0 in lanes where a joint's velocity, or at rest its acceleration, contradicts the direction of its friction mode.

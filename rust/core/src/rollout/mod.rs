@@ -21,7 +21,7 @@ use crate::integrate::State;
 use crate::plant::Plant;
 use crate::real::Real;
 use batch::LaneBatch;
-pub use elastic_batch::{ElasticRollout, stable_substeps};
+pub use elastic_batch::ElasticRollout;
 
 /// Number of runs that a batch rollout simulates at a time.
 pub const WIDTH: usize = 8;

@@ -4,18 +4,15 @@
 //! measured position of its link; neither requires an initial guess.
 
 use crate::log::track::{MeasuredState, Track};
+use crate::predict::window::MAX_SUBSTEPS_FRICTION;
 use armgap_core::arm::Arm;
 use armgap_core::effect::{InputSegment, interval};
-use armgap_core::integrate::{Interval, State, advance};
+use armgap_core::integrate::{Interval, State, StepLimits, advance_in_stable_steps};
 use armgap_core::plant::{Mode, Plant};
 use armgap_core::transmission::{LatentState, Sides, Transmission};
 
 /// Largest product of a motor's natural frequency, rad/s, and step length in the simulation of latent states.
 const STEP: f64 = 1.0;
-
-/// Largest product of natural frequency, rad/s, and step length where measured states are inserted at every sample, so that steps need only be
-/// stable.
-const STABLE: f64 = 1.5;
 
 /// Time constant with which a link behind its motor's encoder is drawn to the deflection by the motor's torque balance, s: long beside a sample, as
 /// accelerations are noisy, short beside the ringing of a shaft with little damping, which would carry an error along the log.
@@ -73,15 +70,16 @@ fn beside_measured<A: Arm<f64, N, P>, const N: usize, const P: usize>(
 ) -> Vec<LatentState<f64, N>> {
     let path = track.path();
     let drivetrain = plant.drivetrain();
-    let rate = plant.fastest(&path[0].q);
+    let rates = plant.step_rates(&path[0].q);
+    let limits = StepLimits { near_standstill: MAX_SUBSTEPS_FRICTION, elsewhere: MAX_STEPS };
     let mut now = State::new(path[0].q, path[0].dq);
     let mut all = Vec::with_capacity(last + 1);
     for k in 0..=last {
         let before = now.latent.deflection;
         if k > 0 {
             let h = track.t[k] - track.t[k - 1];
-            let count = ((h * rate / STABLE).ceil() as usize).clamp(1, MAX_STEPS);
-            advance(plant, &mut now, &Interval { t: track.t[k - 1], h, torque: &torque[k - 1] }, count);
+            let interval = Interval { t: track.t[k - 1], h, torque: &torque[k - 1] };
+            advance_in_stable_steps(plant, &mut now, &interval, &rates, limits);
         }
         if !now.is_finite() || now.latent.deflection.amax() > LIMIT {
             now = State::new(path[k].q, path[k].dq);

@@ -10,9 +10,9 @@ use crate::predict::latent_states::latent_states;
 use armgap_core::arm::Arm;
 use armgap_core::cpu::Level;
 use armgap_core::effect::InputSegment;
-use armgap_core::integrate::{Interval, State, advance};
+use armgap_core::integrate::{Interval, State, StepLimits, advance_in_stable_steps};
 use armgap_core::plant::{Mode, Plant};
-use armgap_core::rollout::{BatchRollout, ElasticRollout, Run, WIDTH, stable_substeps};
+use armgap_core::rollout::{BatchRollout, ElasticRollout, Run, WIDTH};
 use armgap_core::transmission::LatentState;
 use nalgebra::SVector;
 use rayon::prelude::*;
@@ -20,10 +20,10 @@ use rayon::prelude::*;
 /// Size of a predicted position [rad or m] beyond which it has diverged; it is cut there so that its cost stays finite.
 pub(crate) const DIVERGED: f64 = 1e3;
 
-/// Largest number of sub-steps per sample in a window; a stiffer hypothesis is rejected by its cost.
-const MAX_SUBSTEPS: usize = 4;
+/// Largest number of sub-steps per sample for joints whose regularised friction stops them near standstill. Widths that need more are not tried.
+pub(crate) const MAX_SUBSTEPS_FRICTION: usize = 16;
 
-/// Largest number of sub-steps per sample for motors that oscillate against their links.
+/// Largest number of sub-steps per sample for motors that oscillate against their links; a stiffer hypothesis is rejected by its cost.
 const MAX_SUBSTEPS_DRIVEN: usize = 5;
 
 /// Largest number of sub-steps per sample for joints that hit a joint limit.
@@ -293,9 +293,9 @@ impl Rollouts for SideBySide {
 
     fn elastic<A: Arm<f64, N, P>, const N: usize, const P: usize>(runs: &mut [Run<'_, f64, A, N, P>]) {
         let level = Level::widest();
-        let most_substeps = runs.first().map_or(MAX_SUBSTEPS, |run| most_substeps(run.plant));
+        let Some(step_limits) = runs.first().map(|run| step_limits(run.plant)) else { return };
         runs.par_chunks_mut(GROUP)
-            .for_each(|runs| ElasticRollout { runs, limit: DIVERGED, most_substeps }.run_all(level));
+            .for_each(|runs| ElasticRollout { runs, limit: DIVERGED, step_limits }.run_all(level));
     }
 }
 
@@ -333,17 +333,17 @@ fn enter<A: Arm<f64, N, P>, const N: usize, const P: usize>(
 
 /// Simulates one rollout by the scalar integrator, with as many steps per sample as its plant needs.
 fn run_scalar<A: Arm<f64, N, P>, const N: usize, const P: usize>(run: &mut Run<'_, f64, A, N, P>) {
-    let most = most_substeps(run.plant);
+    let limits = step_limits(run.plant);
     let measures_motors = run.plant.drivetrain().measures_motors();
     let state = &mut run.state;
     for (k, row) in run.positions.chunks_exact_mut(N).enumerate() {
         let h = run.t[k + 1] - run.t[k];
-        let mut rate = run.plant.fastest(&state.q);
+        let mut rates = run.plant.step_rates(&state.q);
         if run.plant.jumps() {
-            rate = rate.max(run.plant.fastest(&(state.q + state.dq * h)));
+            rates = rates.max(run.plant.step_rates(&(state.q + state.dq * h)));
         }
-        let substeps = stable_substeps(h, rate, most);
-        advance(run.plant, state, &Interval { t: run.t[k], h, torque: &run.torque[k] }, substeps);
+        let interval = Interval { t: run.t[k], h, torque: &run.torque[k] };
+        advance_in_stable_steps(run.plant, state, &interval, &rates, limits);
         if !state.is_finite() || state.q.amax() > DIVERGED {
             break;
         }
@@ -360,9 +360,10 @@ fn run_stiff<A: Arm<f64, N, P>, const N: usize, const P: usize>(run: &mut Run<'_
     let state = &mut run.state;
     for (k, row) in run.positions.chunks_exact_mut(N).enumerate() {
         let h = run.t[k + 1] - run.t[k];
-        let rate = run.plant.fastest(&state.q).max(run.plant.viscous_rate(&state.q));
-        let steps = stable_substeps(h, rate, MAX_SUBSTEPS_STIFF);
-        advance(run.plant, state, &Interval { t: run.t[k], h, torque: &run.torque[k] }, steps);
+        let mut rates = run.plant.step_rates(&state.q);
+        rates.elsewhere = rates.elsewhere.max(run.plant.viscous_rate(&state.q));
+        let interval = Interval { t: run.t[k], h, torque: &run.torque[k] };
+        advance_in_stable_steps(run.plant, state, &interval, &rates, STIFF);
         if !state.is_finite() || state.q.amax() > DIVERGED {
             break;
         }
@@ -370,11 +371,15 @@ fn run_stiff<A: Arm<f64, N, P>, const N: usize, const P: usize>(run: &mut Run<'_
     }
 }
 
-/// Largest number of sub-steps per sample for a plant.
-fn most_substeps<A: Arm<f64, N, P>, const N: usize, const P: usize>(plant: &Plant<f64, A, N, P>) -> usize {
-    match (plant.jumps(), plant.drivetrain().any()) {
+/// Largest numbers of sub-steps per sample for joints whose viscous friction stops them within less than a sample.
+const STIFF: StepLimits = StepLimits { near_standstill: MAX_SUBSTEPS_STIFF, elsewhere: MAX_SUBSTEPS_STIFF };
+
+/// Largest numbers of sub-steps per sample for a plant.
+fn step_limits<A: Arm<f64, N, P>, const N: usize, const P: usize>(plant: &Plant<f64, A, N, P>) -> StepLimits {
+    let elsewhere = match (plant.jumps(), plant.drivetrain().any()) {
         (true, _) => MAX_SUBSTEPS_IMPACT,
         (false, true) => MAX_SUBSTEPS_DRIVEN,
-        (false, false) => MAX_SUBSTEPS,
-    }
+        (false, false) => 1,
+    };
+    StepLimits { near_standstill: MAX_SUBSTEPS_FRICTION, elsewhere }
 }

@@ -37,14 +37,14 @@ const OUTLYING: f64 = 25.0;
 /// Largest increase of the cost of all other windows by a candidate that explains outlying windows, as a part of the decrease of their cost.
 const HARMLESS: f64 = 0.05;
 
-/// Decrease of the prior cost, in squared sigmas, that makes a cause on its own.
+/// Decrease of the prior cost, in squared standard deviations, that makes a cause on its own.
 pub const TRUST_GAIN: f64 = 16.0;
 
-/// Gap, relative to the motion, above which implausible parameters are no evidence of a cause while the gap is unexplained: the gap may have moved
-/// them.
-const TRUSTWORTHY: f64 = 0.01;
+/// Unexplained gap, relative to the motion, that moves the parameters by about as much as their prior standard deviations: what an unmodelled torque
+/// adds to a gap, it also adds to the parameters that are fitted to it.
+const MOVES_A_SIGMA: f64 = 0.02;
 
-/// Difference of prior costs, in squared sigmas, below which two candidates are look-alikes.
+/// Difference of prior costs, in squared standard deviations, below which two candidates are look-alikes.
 pub const ALIKE_TRUST: f64 = 6.0;
 
 /// Ratio of the cost to its noise floor beyond which a gap without a cause is called unexplained.
@@ -130,6 +130,11 @@ impl<const N: usize, const P: usize> SearchNode<N, P> {
         let gain: f64 = gains().filter(|g| *g > 0.0).sum();
         let loss: f64 = gains().filter(|g| *g < 0.0).sum();
         gain > OUTLYING * self.weights.holdout.typical && -loss < HARMLESS * gain
+    }
+
+    /// Factor by which the gap that is left widens the prior variance of the parameters; 1 where the gap is explained.
+    pub fn prior_inflation(&self) -> f64 {
+        if self.is_open() { inflation(self.relative_error()) } else { 1.0 }
     }
 
     /// Whether an effect is accepted as a cause of a gap of this size: an error of the integrator, which resembles a shift in time or a stiff shaft,
@@ -272,9 +277,7 @@ pub fn is_regularisation<const N: usize, const P: usize>(
 
 /// Whether a candidate is accepted for bringing implausible parameters back to their prior values by one effect.
 pub fn restores<const N: usize, const P: usize>(node: &SearchNode<N, P>, candidate: &Candidate<P>) -> bool {
-    candidate.effect.is_some()
-        && (node.relative_error() < TRUSTWORTHY || !node.is_open())
-        && brings_back(node, candidate)
+    candidate.effect.is_some() && brings_back(node, candidate)
 }
 
 /// Whether a candidate brings implausible parameters back towards their prior values, at no cost.
@@ -282,11 +285,16 @@ pub fn brings_back<const N: usize, const P: usize>(
     node: &SearchNode<N, P>,
     candidate: &Candidate<P>,
 ) -> bool {
-    let before = node.base.fit.prior_cost;
+    let [before, after] = [&node.base, candidate].map(|c| c.fit.prior_cost / node.prior_inflation());
     !is_plausible::<P>(before)
-        && before - candidate.fit.prior_cost > TRUST_GAIN
-        && candidate.fit.prior_cost < 0.4 * before
+        && before - after > TRUST_GAIN
+        && after < 0.4 * before
         && candidate.score() < node.base.score()
+}
+
+/// Factor by which an unexplained gap `relative_error`, relative to the motion, widens the prior variance of the parameters.
+fn inflation(relative_error: f64) -> f64 {
+    1.0 + (relative_error / MOVES_A_SIGMA).powi(2)
 }
 
 #[cfg(test)]
@@ -310,5 +318,13 @@ mod tests {
     fn the_better_of_two_with_as_many_values_stays() {
         assert_eq!(fewest_values(&[offer(100.0, 1), offer(99.0, 1)], 0, ALMOST), 0);
         assert_eq!(fewest_values(&[offer(100.0, 3), offer(99.0, 2), offer(98.0, 2)], 0, ALMOST), 1);
+    }
+
+    #[test]
+    fn a_large_gap_may_have_moved_the_parameters_by_itself() {
+        assert!((inflation(0.001) - 1.0).abs() < 0.01);
+        assert_eq!(inflation(MOVES_A_SIGMA), 2.0);
+        // A distance of 70 squared standard deviations is evidence beside a gap of 2 % of the motion, and none beside one of 10 %.
+        assert!(70.0 / inflation(0.02) > TRUST_GAIN && 70.0 / inflation(0.1) < TRUST_GAIN);
     }
 }

@@ -50,7 +50,10 @@ pub fn name<const N: usize, const P: usize>(
     let best = &node.candidates[choice];
     let alike = |c: &Candidate<P>| match ground {
         Ground::Motion => node.is_alike(best, c),
-        Ground::Trust => restores(node, c) && c.fit.prior_cost - best.fit.prior_cost < ALIKE_TRUST,
+        Ground::Trust => {
+            let apart = (c.fit.prior_cost - best.fit.prior_cost) / node.prior_inflation();
+            restores(node, c) && apart < ALIKE_TRUST
+        }
     };
     let others = (0..node.candidates.len()).filter(|i| *i != choice && node.candidates[*i].effect.is_some());
     let listed: Vec<usize> = others.filter(|i| alike(&node.candidates[*i])).take(LOOK_ALIKES).collect();
@@ -116,10 +119,11 @@ pub fn probability_over<const P: usize>(one: &Candidate<P>, other: &Candidate<P>
 /// Probability of the candidate `choice`, or one that no motion tells from it, among all effects that would restore the prior values of the
 /// parameters, from their prior costs.
 fn trust_probability<const N: usize, const P: usize>(node: &SearchNode<N, P>, choice: usize) -> f64 {
-    let best = node.candidates[choice].fit.prior_cost;
+    let of = |c: &Candidate<P>| c.fit.prior_cost / node.prior_inflation();
+    let best = of(&node.candidates[choice]);
     let free = |c: &Candidate<P>| c.effect.as_ref().map_or(0, EffectInstance::len) as f64;
     // Every value of its own takes one squared sigma of the distance off by chance.
-    let mass = |c: &Candidate<P>| (-0.5 * (c.fit.prior_cost + free(c) - best)).exp();
+    let mass = |c: &Candidate<P>| (-0.5 * (of(c) + free(c) - best)).exp();
     let (mut ours, mut all) = (0.0, 0.0);
     for (i, candidate) in node.candidates.iter().enumerate() {
         if candidate.effect.is_none() {

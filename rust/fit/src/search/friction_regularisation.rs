@@ -9,9 +9,11 @@ use crate::likelihood::context::{DiagnosisContext, SplitWeighting};
 use crate::likelihood::solve::{Effort, Fit, FitProblem};
 use crate::model::hypothesis::Hypothesis;
 use crate::numeric::minimum::minimum;
+use crate::predict::window::MAX_SUBSTEPS_FRICTION;
 use crate::search::acceptance::{ABOVE_FLOOR, is_regularisation};
 use crate::search::attribute::{Candidate, SearchNode};
 use armgap_core::arm::Arm;
+use armgap_core::integrate::largest_stable_rate;
 
 /// Widths of friction regularisation that are tried on all joints at once, relative to the slowest joint's RMS speed.
 const WIDTHS: [f64; 7] = [0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0];
@@ -22,42 +24,101 @@ const REACH: [f64; 2] = [4.0, 20.0];
 /// Evaluations of the cost in each search for a width: of the common width, and of one joint's own.
 const EVALUATIONS: [u64; 2] = [6, 7];
 
-/// Times that the widths of friction regularisation are searched, with the parameters fitted between.
-const ROUNDS: usize = 2;
+/// Factor, either way, of a search for each joint's width around one found with other parameters, and evaluations of the cost in it.
+const REFINED: (f64, u64) = (1.5, 6);
 
-/// Widths of friction regularisation by joint, rad/s or m/s, of least cost, and that cost: the best of `tried` on all joints, then a common width
-/// near it, then one for each joint.
+/// Largest number of times that widths are refined, with the parameters fitted between.
+const ROUNDS: usize = 3;
+
+/// Widths of friction regularisation by joint, rad/s or m/s, and their cost.
+type Widths<const N: usize> = ([f64; N], f64);
+
+/// The widths of less cost, if any, that `joints` share within the factor `reach` of the first one's width in `best`.
+fn nearby<const N: usize>(
+    cost: &impl Fn([f64; N]) -> f64,
+    best: Widths<N>,
+    joints: std::ops::Range<usize>,
+    (reach, evaluations): (f64, u64),
+) -> Widths<N> {
+    let (from, least) = best;
+    let at = |logarithm: f64| {
+        let mut widths = from;
+        widths[joints.clone()].fill(logarithm.exp());
+        widths
+    };
+    let centre = from[joints.start].ln();
+    let found = minimum(|x| cost(at(x)), [centre - reach.ln(), centre + reach.ln()], evaluations);
+    let found = found.map(|x| (at(x), cost(at(x))));
+    found.filter(|(_, reached)| *reached < least).unwrap_or(best)
+}
+
+/// Widths of least cost: the best of `tried`, in order, on all joints, then a common width near it, then one for each joint; none is less than the joint's
+/// `narrowest`.
 fn least_widths<const N: usize>(
     cost: impl Fn([f64; N]) -> f64,
     tried: impl IntoIterator<Item = f64>,
-) -> Option<([f64; N], f64)> {
+    narrowest: [f64; N],
+) -> Option<Widths<N>> {
+    let within = |widths: [f64; N]| std::array::from_fn(|j| widths[j].max(narrowest[j]));
+    let cost = |widths: [f64; N]| cost(within(widths));
+    let least = narrowest.into_iter().fold(f64::INFINITY, f64::min);
+    let mut tried: Vec<f64> = tried.into_iter().map(|width| width.max(least)).collect();
+    tried.dedup();
     let mut best = tried
         .into_iter()
         .map(|width| ([width; N], cost([width; N])))
         .filter(|(_, cost)| cost.is_finite())
         .min_by(|a, b| a.1.total_cmp(&b.1))?;
-    let mut search = |joints: std::ops::Range<usize>, reach: f64, evaluations: u64| {
-        let (from, least) = best;
-        let at = |logarithm: f64| {
-            let mut widths = from;
-            widths[joints.clone()].fill(logarithm.exp());
-            widths
-        };
-        let centre = from[joints.start].ln();
-        let within = [centre - reach.ln(), centre + reach.ln()];
-        let Some(found) = minimum(|x| cost(at(x)), within, evaluations) else { return };
-        let reached = cost(at(found));
-        if reached < least {
-            best = (at(found), reached);
-        }
-    };
-    search(0..N, REACH[0], EVALUATIONS[0]);
+    best = nearby(&cost, best, 0..N, (REACH[0], EVALUATIONS[0]));
     if N > 1 {
         for joint in 0..N {
-            search(joint..joint + 1, REACH[1], EVALUATIONS[1]);
+            best = nearby(&cost, best, joint..joint + 1, (REACH[1], EVALUATIONS[1]));
         }
     }
-    Some(best)
+    Some((within(best.0), best.1))
+}
+
+/// Widths of least cost near the widths `from`, joint by joint; none is less than the joint's `narrowest`.
+fn refined_widths<const N: usize>(
+    cost: impl Fn([f64; N]) -> f64,
+    from: [f64; N],
+    narrowest: [f64; N],
+) -> Widths<N> {
+    let within = |widths: [f64; N]| std::array::from_fn(|j| widths[j].max(narrowest[j]));
+    let cost = |widths: [f64; N]| cost(within(widths));
+    let best = (0..N)
+        .filter(|j| from[*j] > 0.0)
+        .fold((from, cost(from)), |best, joint| nearby(&cost, best, joint..joint + 1, REFINED));
+    (within(best.0), best.1)
+}
+
+/// Narrowest widths of friction regularisation by joint, rad/s or m/s, with which the steps of predictions are stable at the start of every window.
+fn narrowest_widths<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    problem: &FitProblem<A, N, P>,
+    model: &Hypothesis<P>,
+) -> Option<[f64; N]> {
+    let plant = model.rounded_over([1.0; N]).plant(problem.arm)?;
+    let mut narrowest = [0.0_f64; N];
+    for window in &problem.data.windows {
+        let rate = largest_stable_rate(problem.data.tracks[window.track].period(), MAX_SUBSTEPS_FRICTION);
+        for (most, width) in narrowest.iter_mut().zip(plant.widths_at_rate(&window.initial_state.q, rate)) {
+            *most = most.max(width);
+        }
+    }
+    Some(narrowest)
+}
+
+/// The model with its widths of friction regularisation refined; none where this does no better.
+fn with_refined_widths<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    problem: &FitProblem<A, N, P>,
+    model: &Hypothesis<P>,
+    jacobian: &[Vec<f64>],
+) -> Option<Hypothesis<P>> {
+    let narrowest = narrowest_widths(problem, model)?;
+    let cost = |widths: [f64; N]| problem.cost_refitted(&model.rounded_over(widths), jacobian);
+    let own = std::array::from_fn(|j| model.rounding[j]);
+    let (widths, least) = refined_widths(cost, own, narrowest);
+    (least < cost(own)).then(|| model.rounded_over(widths))
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
@@ -69,10 +130,11 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         model: &Hypothesis<P>,
         jacobian: &[Vec<f64>],
     ) -> Option<Hypothesis<P>> {
-        let slowest = self.scales.slowest();
+        let narrowest = narrowest_widths(problem, model)?;
         let cost = |widths: [f64; N]| problem.cost_refitted(&model.rounded_over(widths), jacobian);
         let now = problem.cost_refitted(model, jacobian);
-        let (widths, least) = least_widths(cost, WIDTHS.map(|part| part * slowest))?;
+        let slowest = self.scales.slowest();
+        let (widths, least) = least_widths(cost, WIDTHS.map(|part| part * slowest), narrowest)?;
         (least < now).then(|| model.rounded_over(widths))
     }
 
@@ -109,19 +171,33 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             return None;
         }
         let problem = self.problem(&node.weights.training);
-        let mut best: Candidate<P> = node.base.clone();
+        let model = &node.base.fit.hypothesis;
+        let regularised = self.with_best_widths(&problem, model, &problem.jacobian(model))?;
+        let found = self.candidate(&node.weights, &regularised, model.effects.len(), Effort::FULL, &[]);
+        let best = self.with_widths_refined(node, found);
+        is_regularisation(node, &best).then_some(best.fit)
+    }
+
+    /// A model with its widths of friction regularisation and its parameters refined in turn, as long as the cost falls.
+    pub(crate) fn with_widths_refined(
+        &self,
+        node: &SearchNode<N, P>,
+        mut best: Candidate<P>,
+    ) -> Candidate<P> {
+        let problem = self.problem(&node.weights.training);
+        let cost = |of: &Candidate<P>| of.fit.data_cost + of.fit.prior_cost;
         for _ in 0..ROUNDS {
             let model = &best.fit.hypothesis;
-            let Some(regularised) = self.with_best_widths(&problem, model, &problem.jacobian(model)) else {
+            let Some(refined) = with_refined_widths(&problem, model, &problem.jacobian(model)) else {
                 break;
             };
-            let found = self.candidate(&node.weights, &regularised, model.effects.len(), Effort::FULL, &[]);
-            if found.fit.data_cost + found.fit.prior_cost >= best.fit.data_cost + best.fit.prior_cost {
+            let found = self.candidate(&node.weights, &refined, model.effects.len(), Effort::FULL, &[]);
+            if cost(&found) >= cost(&best) {
                 break;
             }
             best = found;
         }
-        is_regularisation(node, &best).then_some(best.fit)
+        best
     }
 }
 
@@ -136,14 +212,14 @@ mod tests {
 
     #[test]
     fn a_common_width_is_found_between_those_tried() {
-        let (widths, cost) = least_widths(apart([0.005]), WIDTHS).expect("finite costs");
+        let (widths, cost) = least_widths(apart([0.005]), WIDTHS, [0.0]).expect("finite costs");
         assert!((widths[0] / 0.005).ln().abs() < 0.05 && cost < 0.0025, "{widths:?}");
     }
 
     #[test]
     fn every_joint_has_a_width_of_its_own() {
         for best in [[0.002, 0.03], [0.05, 0.004], [0.01, 0.01]] {
-            let (widths, _) = least_widths(apart(best), WIDTHS).expect("finite costs");
+            let (widths, _) = least_widths(apart(best), WIDTHS, [0.0; 2]).expect("finite costs");
             for (found, wanted) in widths.iter().zip(best) {
                 assert!((found / wanted).ln().abs() < 0.2, "{widths:?} for {best:?}");
             }
@@ -153,8 +229,31 @@ mod tests {
     #[test]
     fn widths_that_cannot_be_simulated_are_passed_over() {
         let cost = |widths: [f64; 2]| if widths[0] < 0.01 { f64::NAN } else { widths[0] + widths[1] };
-        let (widths, cost) = least_widths(cost, WIDTHS).expect("some are finite");
+        let (widths, cost) = least_widths(cost, WIDTHS, [0.0; 2]).expect("some are finite");
         assert!(widths[0] >= 0.01 && cost.is_finite());
-        assert!(least_widths(|_: [f64; 2]| f64::INFINITY, WIDTHS).is_none());
+        assert!(least_widths(|_: [f64; 2]| f64::INFINITY, WIDTHS, [0.0; 2]).is_none());
+    }
+
+    #[test]
+    fn widths_near_the_best_are_refined() {
+        let (widths, cost) = refined_widths(apart([0.0076, 0.02]), [0.0084, 0.018], [0.0; 2]);
+        for (found, wanted) in widths.iter().zip([0.0076_f64, 0.02]) {
+            assert!((found / wanted).ln().abs() < 0.02, "{widths:?}");
+        }
+        assert!(cost < 1e-3);
+        let (widths, _) = refined_widths(apart([0.0076, 0.02]), [0.0084, 0.018], [0.008, 0.0]);
+        assert_eq!(widths[0], 0.008);
+    }
+
+    #[test]
+    fn no_width_is_narrower_than_can_be_simulated() {
+        let asked = std::cell::RefCell::new(Vec::new());
+        let cost = |widths: [f64; 2]| {
+            asked.borrow_mut().push(widths);
+            apart([0.002, 0.03])(widths)
+        };
+        let (widths, _) = least_widths(cost, WIDTHS, [0.004, 0.01]).expect("finite costs");
+        assert!(widths[0] == 0.004 && widths[1] > 0.01, "{widths:?}");
+        assert!(asked.borrow().iter().all(|w| w[0] >= 0.004 && w[1] >= 0.01));
     }
 }

@@ -166,11 +166,14 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             }
             let node = &search.node;
             let next = if let Some((choice, ground)) = choose(node, search.regularised, search.threshold) {
-                match node.candidates[choice].effect {
-                    Some(_) => search.causes.push(name(node, choice, ground, seed)),
-                    None => search.regularised = true,
+                let chosen = &node.candidates[choice];
+                if chosen.effect.is_some() {
+                    search.causes.push(name(node, choice, ground, seed));
+                    chosen.fit.clone()
+                } else {
+                    search.regularised = true;
+                    self.with_widths_refined(node, chosen.clone()).fit
                 }
-                node.candidates[choice].fit.clone()
             } else if let Some(fit) =
                 (!search.regularisation_fitted).then(|| self.regularisation(node)).flatten()
             {
