@@ -12,6 +12,7 @@ use crate::likelihood::solve::{Effort, Fit};
 use crate::likelihood::weighting::Weighting;
 use crate::log::track::Track;
 use crate::model::hypothesis::EffectInstance;
+use crate::predict::window::Window;
 use crate::search::acceptance::Ground;
 use crate::search::belief::Cause;
 use crate::search::evidence::Evidence;
@@ -22,8 +23,8 @@ use rayon::prelude::*;
 
 /// Effects that act like pushes, each on one joint, with the initial guess from a push.
 const LAWS: [LawGuess; 2] = [
-    LawGuess { name: "torque_saturation", from_push: limit_guess },
-    LawGuess { name: "contact", from_push: stop_guess },
+    LawGuess { name: "torque_saturation", from_push: limit_guess, acts_as_named: |_, _| true },
+    LawGuess { name: "contact", from_push: stop_guess, acts_as_named: is_elastic },
 ];
 
 /// Bisection steps that find the torque limit from one push.
@@ -43,6 +44,8 @@ struct LawGuess {
     name: &'static str,
     /// Parameters of the effect that acts like the push at the push's time; `None` if the effect cannot.
     from_push: fn(&PushedMotion<'_>) -> Option<[f64; MAX_PARAMETERS]>,
+    /// Whether the effect with fitted parameters acts during the push as its name says.
+    acts_as_named: fn(&[f64; MAX_PARAMETERS], &PushedMotion<'_>) -> bool,
 }
 
 /// Measured motion and commanded torque of a joint during a push.
@@ -59,6 +62,7 @@ struct PushedMotion<'a> {
 
 /// An effect on a joint that may replace some of the pushes.
 struct Trial {
+    law: &'static LawGuess,
     /// First guesses of the effect, one from each push that it may replace.
     guesses: Vec<EffectInstance>,
     /// Pushes that the effect may replace.
@@ -72,6 +76,8 @@ struct Explanation<const N: usize, const P: usize> {
     fit: Fit<P>,
     /// Deviance up to a common constant: Student-t costs of the windows plus prior cost.
     cost: f64,
+    /// Student-t cost of every window.
+    costs: Vec<f64>,
     /// Sum of the windows' costs without robust weights.
     raw: f64,
     weighting: Weighting<N>,
@@ -108,7 +114,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     }
 
     /// Trials of the effect `law` on a joint in the place of pushes that it could have caused; one trial per side of zero, as a stop has one side.
-    fn trials(&self, joint: usize, law: &LawGuess, disturbances: &[Disturbance]) -> Vec<Trial> {
+    fn trials(&self, joint: usize, law: &'static LawGuess, disturbances: &[Disturbance]) -> Vec<Trial> {
         let Some(effect) = find::<f64>(law.name) else { return Vec::new() };
         let guess = |e: &Disturbance| {
             let here = (e.push.joint == joint).then(|| pushed_motion(self.track(e.place()), &e.push))?;
@@ -124,7 +130,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             let pushes = disturbances.iter().cloned().zip(&guessed);
             let (theirs, others): (Vec<_>, Vec<_>) = pushes.partition(|(_, guess)| ours(guess));
             let only = |pairs: Vec<(Disturbance, _)>| pairs.into_iter().map(|(e, _)| e).collect();
-            Trial { guesses, theirs: only(theirs), others: only(others) }
+            Trial { law, guesses, theirs: only(theirs), others: only(others) }
         };
         [1.0, -1.0].map(of_side).into_iter().filter(|trial| !trial.guesses.is_empty()).collect()
     }
@@ -143,10 +149,21 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let rough = fitted.into_iter().min_by(|a, b| score(a).total_cmp(&score(b)))?;
         let found = all.explanation(rough, &pushed.weighting, ROUNDS);
         let effect = *found.fit.hypothesis.effects.last()?;
+        let acts = trial.theirs.iter().any(|e| {
+            let [t, q, torque] = &pushed_motion(self.track(e.place()), &e.push);
+            (trial.law.acts_as_named)(&effect.p, &PushedMotion { push: e.push.p, t, q, torque })
+        });
+        if !acts {
+            return None;
+        }
         let windows = all.training.data.windows.len() as f64;
         let free = |values: usize| values as f64 * windows.ln();
         let of_pushes: usize = trial.theirs.iter().map(|e| e.push.len()).sum();
-        let advantage = pushed.cost + free(of_pushes) - found.cost - free(effect.len());
+        let saved = free(of_pushes) - free(effect.len());
+        // What a law explains elsewhere does not put it in the place of a push.
+        let touched = self.touched(&trial.theirs);
+        let there = |of: &Explanation<N, P>| touched.iter().map(|w| of.costs[*w]).sum::<f64>();
+        let advantage = (pushed.cost - found.cost).min(there(pushed) - there(&found)) + saved;
         if advantage < 0.0 {
             return None;
         }
@@ -172,6 +189,20 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         self.on_windows(self.training.data.clone().and(self.holdout.data.clone()))
     }
 
+    /// Indices of the windows, among those of all logs, in which `pushes` act.
+    fn touched(&self, pushes: &[Disturbance]) -> Vec<usize> {
+        let data = self.training.data.clone().and(self.holdout.data.clone());
+        let logs = self.training.data.tracks.len();
+        let acts = |window: &Window<N>, push: &Disturbance| {
+            let (t, [_, time, duration]) = (&data.tracks[window.track].t, push.push.p);
+            window.track == push.track + if push.holdout { logs } else { 0 }
+                && t[window.first] < time + 0.5 * duration
+                && t[window.last] > time - 0.5 * duration
+        };
+        let windows = data.windows.iter().enumerate();
+        windows.filter(|(_, w)| pushes.iter().any(|push| acts(w, push))).map(|(i, _)| i).collect()
+    }
+
     /// The model refitted to the training windows, and its cost; initial states and weights are recomputed `rounds` times, at the scales and the
     /// typical cost of the weighting `given`.
     fn explanation(&self, fit: Fit<P>, given: &Weighting<N>, rounds: usize) -> Explanation<N, P> {
@@ -183,8 +214,10 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let mut weighting = self.weighting(&self.training, &fit.hypothesis, given.scale, &given.zeros);
         weighting.typical = given.typical;
         let costs = self.problem(&weighting).raw_costs(&fit.hypothesis);
-        let cost = costs.iter().map(|c| weighting.student_t_cost(*c)).sum::<f64>() + fit.prior_cost;
-        Explanation { fit, cost, raw: costs.iter().sum(), weighting }
+        let raw = costs.iter().sum();
+        let costs: Vec<f64> = costs.into_iter().map(|c| weighting.student_t_cost(c)).collect();
+        let cost = costs.iter().sum::<f64>() + fit.prior_cost;
+        Explanation { fit, cost, costs, raw, weighting }
     }
 }
 
@@ -241,6 +274,18 @@ fn stop_guess(motion: &PushedMotion<'_>) -> Option<[f64; MAX_PARAMETERS]> {
     Some([side * position, HALF_SINE * torque / depth, DAMPED * torque * half / depth])
 }
 
+/// Whether a stop takes up more of a motion beyond it by its stiffness than by its damping: what only brakes a joint beyond a position is no stop.
+fn is_elastic(
+    &[position, stiffness, damping, ..]: &[f64; MAX_PARAMETERS],
+    motion: &PushedMotion<'_>,
+) -> bool {
+    let depth = |q: &f64| position.signum() * (q - position);
+    let deepest = motion.q.iter().map(depth).fold(0.0, f64::max);
+    let rates = motion.t.windows(2).zip(motion.q.windows(2)).filter(|(_, q)| depth(&q[1]) > 0.0);
+    let fastest = rates.map(|(t, q)| (q[1] - q[0]).abs() / (t[1] - t[0]).max(1e-9)).fold(0.0, f64::max);
+    stiffness * deepest > damping * fastest
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -293,5 +338,16 @@ mod tests {
             assert!(damping > 0.0);
             assert!(found(side * 2.0 * speed).is_none(), "a push outwards");
         }
+    }
+
+    #[test]
+    fn what_only_brakes_is_no_stop() {
+        let t = times();
+        let q: Vec<f64> = t.iter().map(|t| 0.5 + 0.1 * (20.0 * (t - TIME)).cos()).collect();
+        let torque = vec![0.0; t.len()];
+        let motion = PushedMotion { push: [-0.1, TIME, 0.1], t: &t, q: &q, torque: &torque };
+        assert!(is_elastic(&[0.5, 100.0, 0.5], &motion));
+        assert!(!is_elastic(&[0.5, 0.01, 0.1], &motion));
+        assert!(!is_elastic(&[0.7, 100.0, 0.5], &motion), "a position that is never reached");
     }
 }
