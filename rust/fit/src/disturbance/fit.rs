@@ -17,6 +17,13 @@ const AROUND: f64 = 0.25;
 /// Longest duration of a fitted push, s.
 const LONGEST: f64 = 2.5;
 
+/// Least share of the windows' cost that a push must remove to be kept where the model leaves errors unexplained.
+const HELPS: f64 = 0.01;
+
+/// Least share of the windows' cost, with the model refitted to the recording, that a push must remove to be kept where the model leaves errors
+/// unexplained; the model fitted to the recording with the push is compared with the model fitted without it.
+const HELPS_OWN: f64 = 0.02;
+
 /// Least share that a push must explain of the cost of the windows that it touches before its size by output error is believed.
 const EXPLAINS: f64 = 0.5;
 
@@ -82,8 +89,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     /// share is too small.
     ///
     /// The share counts from the cost of the model without the push, or of the model refitted to the recording alone if that is less. Where the model
-    /// leaves errors unexplained and the output error explains too little to be believed, `rough` is returned unchanged. `known` are the recording's
-    /// further pushes.
+    /// leaves errors unexplained and the output error explains too little to be believed, `rough` is returned unchanged if the push lowers the cost
+    /// under the model or under the refitted one. `known` are the recording's further pushes.
     pub(super) fn sized(
         &self,
         rough: Disturbance,
@@ -127,7 +134,17 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             let sigma = touched.sigma(&fitted, state.covariance)?;
             return Some(Disturbance { push, sigma, share: share(left), ..rough });
         }
-        state.remainder.then(|| Disturbance { share: share(seen), ..rough })
+        if !state.remainder {
+            return None;
+        }
+        if share(seen) > HELPS {
+            return Some(Disturbance { share: share(seen), ..rough });
+        }
+        let others: Vec<&Disturbance> = known.iter().collect();
+        let with: Vec<&Disturbance> = known.iter().chain([&rough]).collect();
+        let without = touched.cost_under(self, &own.beside(&others), &none);
+        let share = 1.0 - touched.cost_under(self, &own.beside(&with), &p) / without;
+        (share > HELPS_OWN).then_some(Disturbance { share, ..rough })
     }
 }
 
