@@ -165,7 +165,7 @@ def _case(folder: Path | None, fresh: int | None, *, quiet: bool) -> Iterator[Pa
 
 
 def _opened(key: Key, result: Diagnosis) -> str:
-    """Return the opened key in words, and whether the diagnosis found the key's cause."""
+    """Return the effect that was hidden in the sample logs, in words, and whether the diagnosis names it."""
     from armgap.trial.verdict import judge
 
     hidden = [f"{_name(h.effect, h.joint)} ({_values(h.parameters)})" for h in key.effects]

@@ -223,7 +223,7 @@ def _most_moved(points: EvidenceSamples) -> int:
 def _points(
     model: Hypothesis, cause: EffectInstance, logs: Sequence[Log]
 ) -> tuple[EvidenceSamples | None, int, list[str]]:
-    """Return evidence from windows spread over all logs, the number of windows, and why others could not be simulated."""
+    """Return the samples of a cause's torque law from windows over all logs, the number of windows used, and why further windows were not."""
     found: list[EvidenceSamples] = []
     failed: list[str] = []
     whole = sum(log.duration for log in logs)

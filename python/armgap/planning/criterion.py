@@ -280,14 +280,14 @@ class PredictedMotion:
         return columns
 
     def outcome(self, pair: HypothesisPair, steps: int = _STEPS) -> Outcome:
-        """Return the expected outcome of the motion for a pair of models; no evidence where a model cannot be simulated.
+        """Return the evidence that a motion is expected to give between two models; zero where either cannot be simulated along it.
 
         Parameters
         ----------
         pair : HypothesisPair
             Models with and without the effect in question.
         steps : int, default 8
-            Gauss-Newton steps in which the rival is fitted, beyond the first-order fit.
+            Gauss-Newton steps in which the wrong model of the pair is fitted to the other's motion, beyond the first-order fit.
         """
         weight = np.array([w for w, _ in pair.alternatives])
         residuals = 0.5 * self._arm.n_joints * self._setting.horizon / self._arm.sample_period

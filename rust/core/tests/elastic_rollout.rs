@@ -173,8 +173,8 @@ fn a_run_that_leaves_the_limit_ends_alone() {
     }
 }
 
-/// Positions that an encoder on the motor shows, of a pendulum behind an elastic shaft: the equations in the motor's own position `motor`, in place of a
-/// deflection (Siciliano 2009, section 6.1), by Runge-Kutta in steps of a hundredth of a sample.
+/// Positions that an encoder on the motor shows, of a pendulum behind an elastic shaft: the equations in the motor's own position `motor`, in place
+/// of a deflection (Siciliano 2009, section 6.1), by Runge-Kutta in steps of a hundredth of a sample.
 fn elastic_pendulum(
     [inertia, weight, viscous, coulomb]: [f64; 4],
     [stiffness, damping, rotor]: [f64; 3],

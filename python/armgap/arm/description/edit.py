@@ -47,7 +47,7 @@ class XmlText:
         self._attributes.setdefault(element.begins, (element, {}))[1].update(values)
 
     def replace(self, element: Element, text: str) -> None:
-        """Replace an element by lines of text."""
+        """Replace an XML element of the robot description, from its opening to its closing tag, by lines of XML text."""
         begins, ends = self._span(element)
         self._changes.append((begins, ends, self._indented(text, self._indent(element))))
 

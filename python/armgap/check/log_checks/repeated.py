@@ -119,7 +119,7 @@ def _holds(q: Array, step: float) -> tuple[int, int, Array]:
 
 
 def _agree(held: _Held, other: _Held) -> bool:
-    """Whether two joints hold their positions in the same rows, where both move."""
+    """Whether the position columns of two joints repeat their last value in the same rows, among the rows in which both joints move."""
     both = held.fast & other.fast
     if np.count_nonzero(both) < _FEWEST:
         return True

@@ -54,10 +54,10 @@ class CorrectedPlanar(Corrected):
         return super().field_of(cause, form)
 
     def uncoupled(self) -> CorrectedPlanar | None:
-        """Return a model with equal motion but without inertial coupling of a remote rotor.
+        """Return a model of equal motion without the inertial coupling of a rotor that sits apart from its joint.
 
-        An inertia `x` that is added to ``M_12`` alone is theta3 larger by `x` with a rotor of joint 2 smaller by `x`. None if
-        the rotor's inertia would become negative, as for a positive coupling without a rotor inertia of joint 2.
+        With ``M_12 = theta3 + theta2 cos q2`` and ``M_22 = theta3 + I_r2``, a coupling inertia `x`, kg m^2, added to ``M_12`` equals
+        theta3 larger by `x` and the rotor inertia ``I_r2`` of joint 2 smaller by `x`. None if ``I_r2`` would become negative.
         """
         x = sum(value(cause, "inertia") for cause in self.causes if cause.effect == "rotor_coupling")
         if not x:

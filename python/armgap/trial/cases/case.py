@@ -195,7 +195,7 @@ def _hide(
     plain: dict[str, Trace],
     duration: float,
 ) -> tuple[tuple[HiddenEffect, ...], dict[str, Trace], dict[str, Any]]:
-    """Draw the hidden effects, enlarge invisible ones, and simulate the logs with all of them."""
+    """Draw a case's hidden effects, enlarge those that change no log by more than its noise, and simulate the logs with all of them."""
     draws = [int(x) for x in rng.integers(0, 2**63, len(effects))]
     hidden: list[HiddenEffect] = []
     sizes, seen = [], {}

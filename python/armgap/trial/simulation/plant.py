@@ -90,17 +90,19 @@ class PlantConfig:
     payload : (mass, distance), optional
         Point mass on the last link, kg and m.
     armature : dict of joint to float
-        Inertia on the joint's own acceleration.
+        Inertia on the joint's own acceleration, kg m^2 (kg).
     spring : dict of joint to (k, q0, cubic)
-        Torque ``-k (q - q0) - cubic (q - q0)^3``.
+        Torque ``-k (q - q0) - cubic (q - q0)^3``, N m (N), with `q` in rad (m).
     drag : dict of joint to (quadratic, cubic)
-        Torque ``-quadratic dq |dq| - cubic dq^3``.
+        Torque ``-quadratic dq |dq| - cubic dq^3``, N m (N), with `dq` in rad/s (m/s).
     discontinuities : dict of joint to list of float
-        Positions at which a torque law jumps; a step across one is cut like a step with a reversal.
+        Positions at which a torque law jumps, rad (m); an integration step across one is divided there, as at a reversal of the velocity.
     coupling : (rotor inertia, gear), optional
-        Rotor of joint 2 on link 1, kinetic energy ``inertia (dq1 + gear dq2)^2 / 2``.
-    torque_laws, friction_laws : dict of joint to list
-        Torque added to the joint; addition to its Coulomb level, given the level so far.
+        Rotor of joint 2 on link 1, inertia in kg m^2, with the kinetic energy ``inertia (dq1 + gear dq2)^2 / 2``.
+    torque_laws : dict of joint to list
+        Functions whose torque, N m (N), is added to the joint's.
+    friction_laws : dict of joint to list
+        Functions of the joint's Coulomb level so far that return an addition to it, N m (N).
     """
 
     arm: TrialArm

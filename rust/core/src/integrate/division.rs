@@ -1,7 +1,7 @@
 //! Division of a sample interval into equal steps that keep Runge-Kutta stable.
 //!
-//! Regularised friction is stiff where a joint is near standstill, and constant where it slides. While all joints slide, steps are as long as the rest
-//! of the plant allows; from a step at whose end one no longer does, the interval is divided again.
+//! Regularised friction is stiff where a joint is near standstill, and constant where it slides. While all joints slide, steps are as long as the
+//! rest of the plant allows; from a step at whose end one no longer does, the interval is divided again.
 
 use super::{Interval, State, fixed_mode_step, substep};
 use crate::arm::Arm;
@@ -11,21 +11,21 @@ use crate::real::{Real, lit};
 /// Product of a step's length and a rate of the plant up to which a step is taken; Runge-Kutta of order four is stable up to 2.8.
 const STABLE: f64 = 1.5;
 
-/// Product of a step's length and the rate of regularised friction up to which a reversal is resolved: motions of 0.75 s of a two-link arm that reverses 20
-/// times are then within 1e-6 rad of those in much shorter steps; within 1e-5 with 0.5, within 1e-4 with 1.5.
+/// Product of a step's length and the rate of regularised friction up to which a reversal is resolved: motions of 0.75 s of a two-link arm that
+/// reverses 20 times are then within 1e-6 rad of those in much shorter steps; within 1e-5 with 0.5, within 1e-4 with 1.5.
 const RESOLVED: f64 = 0.35;
 
 /// Largest numbers of steps in one sample interval.
 #[derive(Debug, Clone, Copy)]
 pub struct StepLimits {
-    /// For the rate of regularised friction, where a joint is near standstill.
+    /// Largest number of steps that the rate of regularised friction may ask for, where a joint is near standstill.
     pub near_standstill: usize,
-    /// For the other rates of a plant.
+    /// Largest number of steps that motors oscillating against their links and impacts on joint limits may ask for.
     pub elsewhere: usize,
 }
 
-/// Number of steps, at least 1 and at most `most`, that divide a sample interval so that a rate whose product with its length is `needed` has a product
-/// with their length of at most `allowed`.
+/// Number of steps, at least 1 and at most `most`, that divide a sample interval so that a rate whose product with its length is `needed` has a
+/// product with their length of at most `allowed`.
 fn substeps<T: Real>(needed: T, allowed: f64, most: usize) -> usize {
     (1..most).find(|count| needed <= lit(allowed * *count as f64)).unwrap_or(most.max(1))
 }

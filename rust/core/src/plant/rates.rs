@@ -39,7 +39,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         self.jumps
     }
 
-    /// Positions of joint `j` at which its torque jumps, with the contacts beyond them.
+    /// Positions of joint `j`, rad (m), at which its torque jumps, each with the contact that is met there, if the jump is due to a joint limit.
     pub fn edges(&self, j: usize) -> impl Iterator<Item = Edge<T>> {
         let on_joint = self.effects().filter(move |e| e.joint == j);
         on_joint.filter_map(|e| e.law.edge(&e.p))
@@ -101,8 +101,8 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         StepRates { friction, elsewhere }
     }
 
-    /// Rate at which regularised friction stops joint `j`, 1/s, near standstill at the position `q`, rad (m); `free` is the joint's inertia with all other
-    /// joints free to move, kg m^2 (kg). Zero for exact friction.
+    /// Rate at which regularised friction stops joint `j`, 1/s, near standstill at the position `q`, rad (m); `free` is the joint's inertia with all
+    /// other joints free to move, kg m^2 (kg). Zero for exact friction.
     fn friction_rate(&self, j: usize, q: T, free: T) -> T {
         if !self.is_rounded(j) {
             return T::zero();
@@ -115,8 +115,8 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         self.level(j, &x, T::one()) / (self.rounding[j] * braked)
     }
 
-    /// Width of friction regularisation of each joint, rad/s (m/s), with which friction stops the joint near standstill at the rate `rate`, 1/s, at the
-    /// positions `q`. Zero for exact friction.
+    /// Width of friction regularisation of each joint, rad/s (m/s), with which friction stops the joint near standstill at the rate `rate`, 1/s, at
+    /// the positions `q`. Zero for exact friction.
     pub fn widths_at_rate(&self, q: &SVector<T, N>, rate: T) -> [T; N] {
         let inertia = self.rigid.equation_terms(&JointState { q: (*q).into(), dq: [T::zero(); N] }).inertia;
         core::array::from_fn(|j| {
@@ -124,8 +124,8 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         })
     }
 
-    /// Whether the regularised friction of joint `j` differs from Coulomb's at the velocity `dq`, rad/s (m/s), by no more than a part in 10^5; true for
-    /// exact friction.
+    /// Whether the regularised friction of joint `j` differs from Coulomb's at the velocity `dq`, rad/s (m/s), by no more than a part in 10^5; true
+    /// for exact friction.
     #[inline]
     pub(crate) fn slides(&self, j: usize, dq: T) -> bool {
         dq.abs() > self.rounding[j] * lit(SLIDING) || !self.is_rounded(j)

@@ -185,7 +185,8 @@ impl<T: Real, const R: usize, N: Count> Rls<T, R, N> {
         self.level.run(UpdateKernel { rls: self, rows, y: y.data.0[0] })
     }
 
-    /// Takes one sample with `M` prediction errors in code that already runs with the instruction set in use.
+    /// Updates the estimate by one sample of `M` equations `y = rows theta`; for callers that are already compiled for the processor's instructions
+    /// `C`.
     #[inline(always)]
     pub(crate) fn learn<C: Cpu, const M: usize>(&mut self, rows: &[[T; R]; M], y: &[T; M]) -> Update<T, M> {
         let mut error = *y;

@@ -1,7 +1,7 @@
 //! Batch rollouts of one plant with elastic joints or regularised friction: one run in each lane of a vector unit.
 //!
-//! Every lane divides its sample intervals into as many steps as keep Runge-Kutta stable, as [`crate::integrate::advance_in_stable_steps`] does. A step
-//! in which the friction mode of a joint changes is left to the scalar integrator ([`crate::integrate`]), in its lane alone.
+//! Every lane divides its sample intervals into as many steps as keep Runge-Kutta stable, as [`crate::integrate::advance_in_stable_steps`] does. A
+//! step in which the friction mode of a joint changes is left to the scalar integrator ([`crate::integrate`]), in its lane alone.
 
 use super::cursor::{RunCursor, lane_values};
 use super::elastic_lanes::{ElasticLanes, ElasticModes, ElasticSpan, ElasticState};

@@ -135,8 +135,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         [1.0, -1.0].map(of_side).into_iter().filter(|trial| !trial.guesses.is_empty()).collect()
     }
 
-    /// The effect that replaces the pushes of a trial, and the decrease of the Bayesian information criterion; `None` if the criterion does not
-    /// decrease. Pushes outside the trial are kept in both models.
+    /// The effect that explains the logs as well as the external pushes that `trial` would replace, and by how much it lowers the Bayesian
+    /// information criterion; `None` if it does not. All other pushes stay in both models.
     fn law_of(&self, trial: &Trial, pushed: &Explanation<N, P>) -> Option<(f64, Cause)> {
         let all = self.of_all_windows();
         let model = &pushed.fit.hypothesis;

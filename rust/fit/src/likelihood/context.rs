@@ -197,8 +197,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         weighting.robust(&sample.data, &residual).with_zeros(zeros.clone())
     }
 
-    /// Weighting around encoder zeros and initial states fitted to the hypothesis once, starting from `zeros`; `fitted` estimates zeros from the
-    /// inner products of their columns.
+    /// Weighting of the residuals after one fit of encoder zeros and initial states to the hypothesis, from the first guess `zeros`; `fitted`
+    /// estimates the zeros from the inner products of the sensitivities of residuals to them.
     fn fitting_zeros(
         &self,
         sample: &WindowSet<N>,

@@ -18,7 +18,7 @@ pub struct LogData<'a> {
     pub tau: &'a [f64],
     /// Reference positions of a controller, rad or m, one row per sample, held until the next sample, and reference velocities where they are logged.
     pub reference: Option<(&'a [f64], Option<&'a [f64]>)>,
-    /// First moment of every torque about the middle of its interval, where it is the mean of several, N m s^2 (N s^2).
+    /// First moment of every torque sample about the middle of its sample interval, N m s^2 (N s^2), where samples are means of several finer ones.
     pub moment: Option<&'a [f64]>,
     /// Torque per unit of size of each custom effect, one value per sample.
     pub tables: Vec<&'a [f64]>,

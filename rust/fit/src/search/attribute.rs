@@ -13,7 +13,7 @@ use armgap_core::effect::{MAX_PARAMETERS, Quantity, Trial, catalogue, find};
 use armgap_core::transmission::Sides;
 use rayon::prelude::*;
 
-/// Other assignments of encoder and friction to motor or link from which the best transmission is fitted again.
+/// Number of further places of encoder and friction, on motor or link, from which the best elastic joint or backlash is fitted again.
 const OTHER_SIDES: usize = 2;
 
 /// Candidates that are fitted again under window weights of the best candidate's residual.

@@ -58,8 +58,8 @@ pub struct Evidence {
     /// Standard deviation of the size ratio.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_ratio_sigma: Option<f64>,
-    /// Odds that the encoder zeros of the recordings have a common mean, rather than scatter around none; only for an offset of the encoder's zero or
-    /// its equivalents, and none where recordings do not differ.
+    /// Odds that the encoder zeros of the recordings have a common mean that is not zero, to their scattering around zero; only for an offset of the
+    /// encoder's zero and effects that are equivalent to it, and `None` where all recordings have the same zero.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub beyond_scatter: Option<f64>,
 }

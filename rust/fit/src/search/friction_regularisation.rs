@@ -52,8 +52,8 @@ fn nearby<const N: usize>(
     found.filter(|(_, reached)| *reached < least).unwrap_or(best)
 }
 
-/// Widths of least cost: the best of `tried`, in order, on all joints, then a common width near it, then one for each joint; none is less than the joint's
-/// `narrowest`.
+/// Widths of least cost: the best of `tried`, in order, on all joints, then a common width near it, then one for each joint; none is less than the
+/// joint's `narrowest`.
 fn least_widths<const N: usize>(
     cost: impl Fn([f64; N]) -> f64,
     tried: impl IntoIterator<Item = f64>,

@@ -207,7 +207,7 @@ fn run<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     }
 }
 
-/// Position, rad or m, and velocity that the encoder of joint `j` shows in a simulated state.
+/// Position, rad or m, and velocity, rad/s or m/s, that the encoder of joint `j` shows in a simulated state.
 fn shown<const N: usize, const P: usize>(
     hypothesis: &Hypothesis<P>,
     state: &State<f64, N>,

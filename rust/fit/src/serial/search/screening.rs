@@ -23,7 +23,8 @@ pub struct Guess {
 }
 
 impl Search<'_> {
-    /// Candidates at all of their initial guesses, with the torque signals of their first-order tests at an estimate.
+    /// For each candidate term its initial guesses, each with the torque signals whose share in the residual torque at the estimate `at` a
+    /// first-order (score) test measures.
     pub(in crate::serial) fn guesses(&self, regression: &Regression, at: &Estimate) -> Vec<Vec<Guess>> {
         let theta = &at.theta;
         let columns = |term: &Term| -> Vec<Signal> {

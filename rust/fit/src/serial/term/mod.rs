@@ -65,7 +65,7 @@ const LOAD: [(&str, &str); 4] = [("mass", "kg"), ("com_x", "m"), ("com_y", "m"),
 const TURN: [(&str, &str); 2] = [("x", "rad"), ("y", "rad")];
 
 impl Term {
-    /// A term of one of the library's effects, with the instance's values.
+    /// A term of the equation of motion from an effect of the catalogue, with the parameters of `effect`.
     pub fn of_law(effect: EffectInstance) -> Self {
         let p = effect.p[..effect.len()].to_vec();
         Self { kind: TermKind::Law(effect), degrees: p.len() as f64, p }

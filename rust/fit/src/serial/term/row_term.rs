@@ -20,7 +20,7 @@ pub struct RowTerm {
     pub first: usize,
     /// Factor of the second joint's position in `q_r = q_first + factor q_second`: 1 or -1.
     pub factor: f64,
-    /// Law of the torque along the combination of the two joints' positions.
+    /// Law of the torque as a function of a weighted sum of two coupled joints' positions; it acts on each joint in proportion to the joint's weight.
     pub law: RowLaw,
 }
 
