@@ -107,8 +107,8 @@ impl Given {
     }
 }
 
-/// Inputs of a controller's proportional, derivative and integral part over the sample intervals of a log: position error, rad (m); its rate or the
-/// negative velocity, rad/s (m/s); and integral of the error from the first sample, rad s (m s).
+/// Inputs of a controller's proportional, derivative and integral part over the sample intervals of a log: position error, rad (m); the error's rate
+/// or the negative velocity, rad/s (m/s); and integral of the error from the first sample, rad s (m s).
 pub type Errors = [Vec<InputSegment<f64>>; 3];
 
 impl JointController {
@@ -141,8 +141,8 @@ impl JointController {
         column
     }
 
-    /// Reference velocity over every sample interval after its delay, rad/s or m/s: as logged, else by central differences; zero for a controller
-    /// that feeds the measured velocity back.
+    /// Reference velocity over every sample interval after the delay of the reference, rad/s or m/s: as logged, else by central differences; zero for
+    /// a controller that feeds the measured velocity back.
     pub fn reference_rate(&self, given: &Given) -> Vec<InputSegment<f64>> {
         let count = given.t.len();
         if !self.rate_of_error {

@@ -146,7 +146,7 @@ impl Search<'_> {
         self.fit(regression, terms, &model.estimate.theta)
     }
 
-    /// The model without the terms, before the last one, that are no longer accepted beside the model's other terms.
+    /// The model without those of its terms, the last one excepted, that are no longer accepted beside the model's other terms.
     fn without_idle(&self, regression: &Regression, model: Fitted) -> Fitted {
         let mut model = model;
         let mut index = 0;

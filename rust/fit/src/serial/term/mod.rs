@@ -147,8 +147,8 @@ impl Term {
         self.name() == other.name() && self.row() == other.row() && (own == others || overlap)
     }
 
-    /// Whether the term can explain all that `other` explains, whatever the motion: a changed last link a payload, and a payload a heavier last link.
-    /// `links` is the number of links of the arm.
+    /// Whether the term can explain all that `other` explains, whatever the motion: a changed last link explains what a payload does, and a payload
+    /// what a heavier last link does. `links` is the number of links of the arm.
     pub fn includes(&self, other: &Self, links: usize) -> bool {
         match (&self.kind, &other.kind) {
             (TermKind::NominalLink(link), TermKind::Payload) => *link + 1 == links,
@@ -275,7 +275,7 @@ impl Term {
         Self { kind: self.kind.clone(), p, degrees: self.degrees }
     }
 
-    /// The library's effect with the term's values; none for a term that is no effect of the library on one joint.
+    /// The library's effect with the term's values; `None` for a term that is no effect of the library on one joint.
     pub fn effect(&self) -> Option<EffectInstance> {
         let TermKind::Law(mut effect) = self.kind else { return None };
         for (slot, value) in effect.p.iter_mut().zip(&self.p) {

@@ -30,7 +30,7 @@ pub enum RowLaw {
     /// Inertia, viscous and Coulomb friction of a coupled transmission; each of the three flags tells whether that parameter is estimated; else the
     /// parameter is zero.
     Transmission([bool; 3]),
-    /// A linear spring with a stiffness and a rest position.
+    /// A linear spring with a stiffness, N m/rad (N/m), and a rest position, rad (m), of the sum or difference of the joints' positions.
     Spring,
 }
 

@@ -356,7 +356,7 @@ impl Score {
     }
 }
 
-/// Result of a first-order test of further torques.
+/// Result of a first-order test of torques that are added to that of the parameters.
 #[derive(Debug, Clone)]
 pub struct Score {
     /// Estimated sizes of the tested torques, as factors on these torques.
