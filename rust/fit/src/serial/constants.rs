@@ -11,38 +11,38 @@ pub const SIGNIFICANT: f64 = 34.0;
 pub const NOTICED: f64 = 9.0;
 
 /// Decrease of the training cost (weighted squared residuals), per parameter of a term of the model, from which the term is accepted: twice the
-/// logarithm of some 400 candidates.
+/// natural logarithm of the number of candidates, some 400.
 pub const PRICE: f64 = 12.0;
 
-/// Standard deviations by which the size of a term of the model on the holdout has to exceed zero: one of 700 false terms that the training logs
-/// accept passes by chance.
+/// Number of standard deviations by which the size of a term of the model, estimated on the holdout, has to exceed zero: of 700 false terms that the
+/// training logs accept, one passes by chance.
 pub const HOLDOUT_DEVIATIONS: f64 = 3.0;
 
-/// Share, 0 to 1, of one joint's squared holdout residuals that a term of the model has to explain to be accepted.
+/// Smallest share, 0 to 1, of the squared holdout residuals of at least one joint that a term of the model has to remove to be accepted.
 pub const MATTERS: f64 = 0.1;
 
-/// RMS torque of a term of the model, relative to the RMS torque of the joint it acts on most, below which the term is too small to matter.
+/// Smallest RMS torque of a term of the model, relative to the RMS torque of the joint that it acts on most, at which the term is accepted.
 pub const CONSEQUENCE: f64 = 0.005;
 
 /// Decrease of the parameters' squared distance from the arm file's values, counted in standard deviations, above which a term that only brings the
 /// parameters back to these values is accepted, besides [`RESTORES_EACH`] for every parameter of the term. Where the arm file's values are as
-/// uncertain as their standard deviations say, a payload of four parameters exceeds the sum by chance once in 2,000 logs.
+/// uncertain as their standard deviations say, a payload of four parameters exceeds `RESTORES + 4 RESTORES_EACH` by chance once in 2,000 logs.
 pub const RESTORES: f64 = 14.0;
 
 /// Further decrease of the parameters' squared distance from the arm file's values, per parameter of a term that only brings the parameters back to
 /// these values, see [`RESTORES`].
 pub const RESTORES_EACH: f64 = 1.5;
 
-/// Prior standard deviation of a changed link's inertial parameters, as a multiple of the arm file's: loose, and yet enough to hold the parameters
-/// that motion does not determine near the arm file's values.
+/// Prior standard deviation of the inertial parameters of a link whose nominal values are tested as wrong, as a multiple of the arm file's standard
+/// deviation: loose, and yet enough to hold the parameters that motion does not determine near the arm file's values.
 pub const LOOSE: f64 = 10.0;
 
-/// Share of the cost that a term of the model explains: a rival term whose model costs no more than this share above the cost with the term, or no
-/// more than [`ALIKE_COST`], is a look-alike.
+/// Excess of a model's cost after one of its terms has been replaced by another term, as a share of the cost that the replaced term explains, below
+/// which the other term is a look-alike: it explains the logs as well. An excess below [`ALIKE_COST`] makes a look-alike in any case.
 pub const ALIKE: f64 = 0.05;
 
-/// Difference of the costs (weighted squared residuals) of two models below which their terms are look-alikes, see [`ALIKE`]: two standard deviations
-/// squared.
+/// Difference of the costs (weighted squared residuals) of two models that differ in one term, below which the one term is a look-alike of the other,
+/// see [`ALIKE`]: two standard deviations, squared.
 pub const ALIKE_COST: f64 = 4.0;
 
 /// Number of candidate terms, the best by first-order tests, that are fitted in each step of the model search.
@@ -57,7 +57,7 @@ pub const ENOUGH: f64 = 1e-3;
 /// Number of bootstrap resamples of the one-second blocks of the logs from which the probability of a cause is taken.
 pub const RESAMPLES: usize = 400;
 
-/// Share, 0 to 1, of the moving joints on which a law has to be significant to be reported as one cause of the whole arm.
+/// Smallest share, 0 to 1, of the moving joints on which a law has to be significant to be reported as one cause of the whole arm.
 pub const ARM_WIDE: f64 = 0.5;
 
 /// Number of laws that are fitted to all joints at once in one step of the model search: those that explain most to first order.

@@ -46,9 +46,9 @@ pub struct SerialArm {
     pub theta: Vec<f64>,
     /// Standard deviations of the arm's parameters, SI, in the order of the parameters; zero for a value that is not estimated.
     pub sigma: Vec<f64>,
-    /// Encoder step of each joint, rad or m; none where unknown.
+    /// Encoder step of each joint, rad or m; `None` where the steps are unknown.
     pub steps: Option<Vec<f64>>,
-    /// Position controllers of the arm's joints, for logs that hold references in place of torques.
+    /// Position controllers of the arm's joints, needed for logs that hold references in place of torques; `None` where the arm file has none.
     pub controller: Option<PositionController>,
 }
 
@@ -232,15 +232,15 @@ fn controller_settings(controller: &PositionController, inertia: &[f64], period:
     all.map(|(setting, joint)| group(setting, joint)).collect()
 }
 
-/// Largest number of half cycles of a torque ripple over the travel of a joint.
+/// Largest number of half cycles over the travel of a joint with which a torque ripple is tried.
 const HALF_CYCLES: usize = 80;
 
-/// Transmitted torques around zero within which a link crosses its backlash, relative to the joint's RMS torque.
+/// Initial guesses of the transmitted torque around zero within which a link crosses its backlash, relative to the joint's RMS torque.
 const CROSSINGS: [f64; 2] = [0.03, 0.15];
 
 /// Every candidate term of an arm without controllers, at each of its initial guesses, grouped by effect and joint. Left out are effects of the
-/// library that simulate a motor beside its link (the weak form has terms of its own for transmissions), pushes, and effects on the whole arm, which
-/// are stated for arms in a plane.
+/// library that simulate a motor beside its link (the weak form has terms of its own for transmissions), external disturbances, and effects on the
+/// whole arm, which are stated for arms in a plane.
 fn candidates<const N: usize, const P: usize>(
     arm: &Chain<f64, N>,
     theta: &[f64; P],

@@ -43,7 +43,7 @@ impl<const N: usize, const P: usize> Model<N, P> {
         model
     }
 
-    /// The model with its torques from position controllers (`closed_loop`), if there are any, in place of logged torques.
+    /// The model with its torques from the position controllers `closed_loop` in place of the logged torques; with `None` the logged torques stay.
     pub fn behind(self, closed_loop: Option<ClosedLoop<N>>) -> Self {
         Self { closed_loop, ..self }
     }

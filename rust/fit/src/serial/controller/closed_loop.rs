@@ -19,13 +19,14 @@ use rayon::prelude::*;
 /// Longest period of a simulated position controller, s.
 const PERIOD: f64 = 1e-3;
 
-/// Period of a simulated position controller, at most, relative to the time constant of its closed loop.
+/// Largest period of a simulated position controller, relative to the time constant of its closed loop.
 const RESOLVED: f64 = 0.2;
 
 /// Largest number of controller periods in one sample interval.
 const MOST_PERIODS: usize = 100;
 
-/// Part of a controller period by which a sample interval may exceed a whole number of periods without a further one: sample times are rounded.
+/// Part of a controller period by which a sample interval may be longer than a whole number of periods before it is divided into one period more:
+/// sample times are rounded.
 const ROUNDING: f64 = 1e-6;
 
 /// Number of time constants after which a lag has forgotten its input.
@@ -36,7 +37,7 @@ const FORGOTTEN: f64 = 8.0;
 pub struct ClosedLoop<const N: usize> {
     /// Position controllers by joint.
     pub joints: Vec<JointController>,
-    /// Torque of each integral part at the start of each log, N m or N, by log and joint.
+    /// Torque of each controller's integral part at the start of each log, N m or N, by log and joint.
     pub held_before: Vec<[f64; N]>,
 }
 
@@ -46,7 +47,7 @@ struct Servo {
     reference: Vec<InputSegment<f64>>,
     rate: Vec<InputSegment<f64>>,
     integral: Vec<InputSegment<f64>>,
-    /// Torque along the measured path before its delay, N m or N, by sample interval.
+    /// Torque that the controller commands along the measured path after its limit and before its delay, N m or N, by sample interval.
     measured: Vec<InputSegment<f64>>,
     /// Effects of the drive on the commanded torque (delay, lag, saturation), the controller's own delay first.
     laws: Vec<EffectInstance>,

@@ -20,14 +20,14 @@ pub struct Commanded<const N: usize> {
     pub controller: PositionController,
     /// Reference and measured path of each joint's controller, log by log.
     pub given: Vec<[Given; N]>,
-    /// Means of torque and regressor over the rows of each log, by log and joint; none for joints without an integral part.
+    /// Means of torque and regressor over the rows of each log, by log and joint; `None` for joints without an integral part.
     levels: Vec<Vec<Option<Level>>>,
 }
 
 /// Means of torque and regressor over the rows of one joint in one log.
 type Level = (f64, Vec<f64>);
 
-/// Torques of the controllers along a log's measured path, N m or N, by sample interval and joint; none for a log without a reference.
+/// Torques of the controllers along a log's measured path, N m or N, by sample interval and joint; `None` for a log without a reference.
 pub fn torques<const N: usize>(
     controller: &PositionController,
     track: &Track<N>,
@@ -37,7 +37,7 @@ pub fn torques<const N: usize>(
     Some((0..track.len()).map(|k| std::array::from_fn(|j| columns[j][k])).collect())
 }
 
-/// Reference and measured path of each joint's controller along a log; none for a log without a reference.
+/// Reference and measured path of each joint's controller along a log; `None` for a log without a reference.
 pub fn given<const N: usize>(track: &Track<N>) -> Option<[Given; N]> {
     (0..N).map(|j| Given::new(track, j)).collect::<Option<Vec<_>>>()?.try_into().ok()
 }
@@ -156,7 +156,8 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         }
     }
 
-    /// Nominal torque minus the torque with a controller's setting changed by `value`, N m or N, by joint and row of the weak form.
+    /// Torque of a controller with the arm file's settings minus its torque with one setting changed by `value`, N m or N, by joint and row of the
+    /// weak form; see [`ControllerTerm::on`].
     pub(in crate::serial) fn of_controller(&self, term: ControllerTerm, value: f64) -> Signal {
         let Some(commanded) = &self.commanded else { return vec![None; N] };
         let j = term.joint;
@@ -171,8 +172,8 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         self.weak(&torques)
     }
 
-    /// Torque of each integral part at the start of each log, N m or N, by log and joint: the mean torque that the arm with parameters `theta` and
-    /// `terms` needs and the controller's proportional and derivative parts do not give; zero for joints without an integral part.
+    /// Torque of each controller's integral part at the start of each log, N m or N, by log and joint: the mean torque that the arm with parameters
+    /// `theta` and `terms` needs and the controller's proportional and derivative parts do not give; zero for joints without an integral part.
     pub fn held_before(&self, theta: &[f64], terms: &[Term]) -> Vec<[f64; N]> {
         let mut held = vec![[0.0; N]; self.logs.len()];
         let Some(commanded) = &self.commanded else { return held };
@@ -207,7 +208,8 @@ mod tests {
     const VISCOUS: f64 = 0.9;
     /// Constant torque that the joint needs on top of those of inertia and friction, N m.
     const OFFSET: f64 = 1.3;
-    /// Largest error of torques of some 8 N m computed from a log by test functions, local cubics and references that are straight between rows, N m.
+    /// Largest error, N m, of torques of some 8 N m that are computed from a log by test functions, local cubics and references that are straight
+    /// between rows.
     const MET: f64 = 0.02;
 
     /// One joint about the vertical, with a known moment of inertia and viscous friction.

@@ -79,7 +79,7 @@ pub struct Given {
 }
 
 impl Given {
-    /// Reference and measured path of joint `j` (0-based) along a log; none for a log without a reference.
+    /// Reference and measured path of joint `j` (0-based) along a log; `None` for a log without a reference.
     pub fn new<const N: usize>(track: &Track<N>, j: usize) -> Option<Self> {
         let reference = track.reference.as_ref()?;
         let smoothed = track.smoothed();
@@ -107,8 +107,8 @@ impl Given {
     }
 }
 
-/// Inputs of a controller's proportional, derivative and integral part over the sample intervals of a log: position error, rad (m); its rate or the
-/// negative velocity, rad/s (m/s); and integral of the error from the first sample, rad s (m s).
+/// Inputs of a controller's proportional, derivative and integral part over the sample intervals of a log: position error, rad (m); the error's rate
+/// or the negative velocity, rad/s (m/s); and integral of the error from the first sample, rad s (m s).
 pub type Errors = [Vec<InputSegment<f64>>; 3];
 
 impl JointController {
@@ -141,8 +141,8 @@ impl JointController {
         column
     }
 
-    /// Reference velocity over every sample interval after its delay, rad/s or m/s: as logged, else by central differences; zero for a controller
-    /// that feeds the measured velocity back.
+    /// Reference velocity over every sample interval after the delay of the reference, rad/s or m/s: as logged, else by central differences; zero for
+    /// a controller that feeds the measured velocity back.
     pub fn reference_rate(&self, given: &Given) -> Vec<InputSegment<f64>> {
         let count = given.t.len();
         if !self.rate_of_error {
@@ -163,7 +163,7 @@ impl JointController {
         column
     }
 
-    /// Inputs of the controller's three parts along the measured path.
+    /// Inputs of the controller's proportional, derivative and integral part along the measured path.
     pub fn errors(&self, given: &Given) -> Errors {
         let (reference, rate) = (self.reference(given), self.reference_rate(given));
         let apart = |a: &[InputSegment<f64>], b: &[InputSegment<f64>]| -> Vec<InputSegment<f64>> {
@@ -185,13 +185,14 @@ impl JointController {
         [proportional, apart(&rate, &given.dq), accumulated]
     }
 
-    /// Torque along the measured path before its limit and delay, N m or N, from the controller's inputs.
+    /// Torque that the controller commands along the measured path before limit and delay, N m or N, from the inputs of its three parts.
     fn asked(&self, errors: &Errors) -> Vec<InputSegment<f64>> {
         let part = |gain: usize, k: usize| errors[gain][k].map(|e| self.gains[gain] * e);
         (0..errors[0].len()).map(|k| part(0, k).plus(part(1, k)).plus(part(2, k))).collect()
     }
 
-    /// Torque along the measured path within its limit, before its delay, N m or N, from the controller's inputs.
+    /// Torque that the controller commands along the measured path after the limit and before the delay, N m or N, from the inputs of its three
+    /// parts.
     pub fn prompt_torque(&self, errors: &Errors) -> Vec<InputSegment<f64>> {
         self.asked(errors).into_iter().map(|torque| torque.map(|tau| self.clipped(tau))).collect()
     }
@@ -203,7 +204,8 @@ impl JointController {
         torque
     }
 
-    /// Mean derivative of the torque by a gain (0 `kp`, 1 `kd`, 2 `ki`) over every sample interval; zero while the torque is at its limit.
+    /// Mean derivative of the commanded torque by a gain over every sample interval, rad (m) for `kp` (`gain` 0), rad/s (m/s) for `kd` (1), rad s (m
+    /// s) for `ki` (2); zero while the torque is at its limit.
     pub fn derivative(&self, given: &Given, gain: usize) -> Vec<f64> {
         let errors = self.errors(given);
         let within = |tau: f64| if tau.abs() < self.torque_limit { 1.0 } else { 0.0 };
@@ -235,8 +237,8 @@ pub(in crate::serial) mod tests {
 
     const PERIOD: f64 = 0.004;
     const COUNT: usize = 500;
-    /// Largest error of these torques of up to 10 N m, N m, from local cubics, which may be as wide as a tenth of a second, and their values in the
-    /// middle of intervals.
+    /// Largest error, N m, of torques of up to 10 N m that are computed from local cubics, which may be as wide as a tenth of a second, and
+    /// interpolated in the middle of sample intervals.
     const CUBIC: f64 = 3e-3;
     pub(in crate::serial) const SERVO: JointController = JointController {
         gains: [40.0, 3.0, 0.0],
@@ -269,8 +271,8 @@ pub(in crate::serial) mod tests {
         Given::new(&track, 0).unwrap()
     }
 
-    /// Mean torque, N m, over sample interval `k` of a servo that runs a hundred times in it, with its reference late by `reference` and its torque
-    /// late by `late`, s.
+    /// Mean torque, N m, over sample interval `k` of a servo that runs a hundred times in the interval, with its reference late by `reference` and
+    /// its torque late by `late`, s.
     fn fast_servo(k: usize, servo: &JointController, reference: f64, late: f64) -> f64 {
         let steps = 100;
         let one = |i: usize| {

@@ -10,14 +10,14 @@ use crate::serial::search::{Found, Tested};
 use crate::serial::term::{Term, TermKind};
 use armgap_core::effect::{Effect, Scope, Trial, catalogue};
 
-/// Quantile of the normal distribution for bounds at 95 %.
+/// One-sided 95 % quantile of the standard normal distribution, for upper confidence limits of the sizes of effects.
 const NORMAL_95: f64 = 1.645;
 
-/// Standard deviation of an effect's torque, relative to the joint's torque, above which the logs do not excite the effect.
+/// Standard deviation of an effect's estimated torque (RMS), relative to the joint's RMS torque, above which the logs do not excite the effect.
 const NOT_EXCITED: f64 = 0.2;
 
-/// Unexplained share of a joint's torque above which joint elasticity and backlash are undecided: their first-order test may miss what they do beyond
-/// first order.
+/// RMS of the torque that a model leaves unexplained, relative to the joint's RMS torque, above which joint elasticity and backlash are undecided:
+/// first-order tests may miss what these effects do beyond first order.
 const HIDES: f64 = 0.01;
 
 const NOT_TESTED: &str = "not tested on serial arms from such logs";
@@ -28,7 +28,7 @@ fn rotary_of(term: &Term, rotary: &[bool]) -> bool {
     term.joints().first().is_none_or(|j| rotary[j - 1])
 }
 
-/// Joints of a term that acts on several joints, or on a sum or difference of two; empty for other terms.
+/// Joints of a term that acts on several joints, or along the sum or difference of two joints' positions; empty for other terms.
 fn several(term: &Term) -> SeveralJoints {
     let joints = term.joints();
     SeveralJoints { joints: (joints.len() > 1).then_some(joints), row: term.row() }
@@ -100,7 +100,8 @@ pub(in crate::serial) fn cause(
     cause
 }
 
-/// Status of every tested effect, joint by joint, that is not among the named causes; `unexplained` is the unexplained share of each joint's torque.
+/// Status of every effect, joint by joint, that is not among the causes that were found, undecided for effects that are not tested; `unexplained` is
+/// the RMS torque that the final model leaves unexplained, relative to the RMS torque, by joint.
 pub(in crate::serial) fn ruled_out(
     found: &Found,
     unexplained: &[Option<f64>],
@@ -130,7 +131,7 @@ pub(in crate::serial) fn ruled_out(
     all
 }
 
-/// Place of a term as text that follows its name, such as ` of joint 2`.
+/// Joints of a term as text that follows the term's name, such as ` of joint 2`.
 fn place_of(term: &Term) -> String {
     let joints: Vec<String> = term.joints().iter().map(usize::to_string).collect();
     match joints.as_slice() {

@@ -18,8 +18,8 @@ pub(in crate::serial) fn with_settings(
     joints
 }
 
-/// Names of joint elasticity and backlash as effects and as text: neither is tested in logs without torques, and both change the damping of the
-/// control loop too.
+/// Names of joint elasticity and backlash in results and in sentences: neither effect is tested in logs without torques, and both change the damping
+/// of a control loop as a wrong derivative gain does.
 const NOT_TESTED: [(&str, &str); 2] = [("joint_elasticity", "a shaft that twists"), ("backlash", "backlash")];
 
 /// Look-alikes of a cause that no log of references and positions distinguishes from it, and effects that such logs cannot test beside it.

@@ -149,8 +149,8 @@ fn models<const N: usize, const P: usize>(
     [of(&nominal, &[]), of(refit, &[]), of(&reported.estimate.theta, &reported.terms)]
 }
 
-/// Share of each joint in the torque that the re-estimated arm leaves unexplained on the holdout, largest first; each joint's unexplained torque
-/// counts relative to the joint's own torque.
+/// Share of each joint, 0 to 1, in the squared torque that the re-estimated arm leaves unexplained on the holdout above the position noise, largest
+/// first; each joint's unexplained squared torque is first divided by the joint's whole squared torque.
 fn places<const N: usize, const P: usize>(found: &Found, holdout: &Set<N, P>) -> Vec<Location> {
     let square = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>();
     let rows = &holdout.equation.rows.joints;
@@ -270,7 +270,7 @@ fn free_runs<const N: usize, const P: usize>(
     (free_run_series(&data, &measured, [&before, &after]), run)
 }
 
-/// RMS of the torque that a model leaves unexplained on the holdout, relative to the RMS torque, by joint; none for a joint without torque.
+/// RMS of the torque that a model leaves unexplained on the holdout, relative to the joint's RMS torque, by joint; `None` for a joint without torque.
 fn unexplained<const N: usize, const P: usize>(set: &Fitted, holdout: &Set<N, P>) -> Vec<Option<f64>> {
     let square = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>();
     let rows = &holdout.equation.rows;
@@ -316,7 +316,7 @@ fn logs<const N: usize>(data: &Dataset<N>) -> Vec<LogSummary> {
     data.tracks.iter().enumerate().map(of).collect()
 }
 
-/// Remark on joints whose Coulomb friction is regularised; `widths` by joint, rad/s or m/s, zero for dry friction.
+/// Remark on joints whose Coulomb friction is regularised, `None` if there are none; `widths` by joint, rad/s or m/s, zero for dry friction.
 pub(crate) fn regularised(widths: &[f64]) -> Option<String> {
     let wide: Vec<String> = widths
         .iter()
@@ -329,7 +329,8 @@ pub(crate) fn regularised(widths: &[f64]) -> Option<String> {
     })
 }
 
-/// Remarks of the result: the share of each joint's torque that stays unexplained, joints that hardly move, and estimated gains of controllers.
+/// Remarks of the result: the share of each joint's torque that stays unexplained, joints that do not move in the training logs, and estimated gains
+/// of controllers.
 fn notes<const N: usize, const P: usize>(
     found: &Found,
     training: &Set<N, P>,

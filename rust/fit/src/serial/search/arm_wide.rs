@@ -1,8 +1,9 @@
 //! One law on several joints at once, found as one cause in one step of the model search.
 //!
 //! Friction laws, delays and lags usually act on every joint. The candidate has an amplitude per joint, or one value for all joints where the law is
-//! a delay or a gain, and is judged as a term on one joint is, by its number of parameters. It has to be significant on each joint that it keeps and
-//! on half of the moving joints, and what it explains beyond the law on the one joint where the law explains most has to be accepted by itself.
+//! a delay or a gain, and is judged as a term on one joint is, by its number of parameters. The candidate has to be significant on each of its
+//! joints, and on at least half of the moving joints. In addition, what it explains beyond the same law on a single joint, the one where the law
+//! explains most, has to be accepted by itself.
 
 use crate::serial::constants::{ARM_WIDE, ARM_WIDE_FINALISTS, CONSEQUENCE, NOTICED, PRICE};
 use crate::serial::search::Search;
@@ -11,11 +12,12 @@ use crate::serial::search::fitting::Fitted;
 use crate::serial::term::Term;
 use crate::serial::weak_form::rows::Regression;
 
-/// Number of joints that a law has to be found on to be one cause of the whole arm, or all moving joints where fewer move.
+/// Smallest number of joints that a law has to be found on to be one cause of the whole arm; where fewer joints move, all moving joints.
 const FEWEST_JOINTS: usize = 3;
 
 impl Search<'_> {
-    /// Fitted models with one more law on several joints, where accepted; tried for the laws that explain most to first order.
+    /// Models with one more law on several joints at once, fitted and accepted; tried are the laws that lower the cost most in the first-order tests
+    /// `screened`.
     pub(in crate::serial) fn on_several_joints(
         &self,
         regression: &Regression,
@@ -48,7 +50,7 @@ impl Search<'_> {
         a.is_of_a_joint() && a.name() == b.name() && units(a) == units(b)
     }
 
-    /// Number of joints that a law has to be found on to be one cause of the whole arm.
+    /// Smallest number of joints that a law has to be found on to be one cause of the whole arm, from the number of joints that move.
     fn fewest(&self) -> usize {
         let moving = self.training.rows().joints.iter().filter(|r| !r.y.is_empty()).count();
         let half = (ARM_WIDE * moving as f64).ceil() as usize;
@@ -85,7 +87,8 @@ impl Search<'_> {
         is_accepted.then_some(best)
     }
 
-    /// A law with one value, the mean of the joints in `noticed`, on every moving joint whose term in the model it would not repeat.
+    /// The law of the terms `noticed` with one value for all joints, the mean over `noticed`, on every moving joint on which the model does not have
+    /// this law yet.
     fn on_every_joint(&self, model: &Fitted, noticed: &[Term]) -> Term {
         let rows = &self.training.rows().joints;
         let moves = |term: &Term| {
@@ -98,7 +101,8 @@ impl Search<'_> {
         Term::common(members).with(Term::common(noticed.to_vec()).p)
     }
 
-    /// Parts, joint by joint, of the term of index `last` that are significant on the training logs and lower the holdout's cost of their joint.
+    /// Those members, one for each joint, of the term of index `last` in the model `with` that are significant on the training logs, large enough to
+    /// matter, and on whose joint this model has a lower holdout cost than the model `without` the term.
     fn noticed(&self, regression: &Regression, without: &Fitted, with: &Fitted, last: usize) -> Vec<Term> {
         let held = |set: &Fitted, joint: usize| set.costs[1][joint - 1].iter().sum::<f64>();
         let is_noticed = |member: &Term| {
@@ -115,7 +119,8 @@ impl Search<'_> {
         with.terms[last].members().into_iter().filter(is_noticed).collect()
     }
 
-    /// Whether the last term of `with` on its further joints is accepted beside the same law on the one joint where the law explains most.
+    /// Whether the last term of the model `with`, on its joints other than the one where its law explains most, is accepted beside the same law on
+    /// that joint.
     fn is_more_than_on_one_joint(&self, regression: &Regression, model: &Fitted, with: &Fitted) -> bool {
         let last = model.terms.len();
         let fell = |term: &Term| {
@@ -138,7 +143,7 @@ impl Search<'_> {
         self.evidence(regression, &alone, &apart, last + 1).is_accepted()
     }
 
-    /// The terms with `added`; terms of one law on enough joints to be a cause of the whole arm become one term.
+    /// The terms of a model with `added` as a further one; terms of one law on enough joints to be a cause of the whole arm become one term.
     pub(in crate::serial) fn joined(&self, terms: Vec<Term>, added: Term) -> Vec<Term> {
         let first = added.members().swap_remove(0);
         let (same, mut joined): (Vec<Term>, Vec<Term>) =

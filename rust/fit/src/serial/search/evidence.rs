@@ -13,9 +13,10 @@ use crate::serial::weak_form::rows::{JointRows, Regression, Rows, Signal};
 pub struct Evidence {
     /// Effective number of the term's parameters.
     pub parameters: f64,
-    /// Decrease of the cost (weighted squares) of the training logs and the prior by the term.
+    /// Decrease, by the term, of the cost on the training logs: weighted squared residuals plus squared distance of the parameters from the arm
+    /// file's values, counted in standard deviations.
     pub gain: f64,
-    /// Decrease, by the term, of the parameters' squared distance from the prior, in standard deviations.
+    /// Decrease, by the term, of the parameters' squared distance from the arm file's values, counted in standard deviations.
     pub relief: f64,
     /// Squared test statistic of the term on the training logs: estimated size over its standard deviation, robust to residuals correlated within
     /// blocks.
@@ -24,9 +25,9 @@ pub struct Evidence {
     pub holdout_gain: f64,
     /// Size of the term in the holdout, relative to the training logs, over the size's standard deviation (see [`Search::evidence`]).
     pub deviations: f64,
-    /// Share of one joint's holdout cost that the term removes, 0 to 1, of the joint with the largest share.
+    /// Share of a joint's holdout cost (weighted squared residuals) that the term removes, 0 to 1, for the joint with the largest share.
     pub share: f64,
-    /// RMS torque of the term relative to the torque of the joint, of the joint with the largest ratio.
+    /// RMS torque of the term relative to the RMS torque of the joint, for the joint with the largest ratio.
     pub consequence: f64,
 }
 
@@ -97,8 +98,8 @@ impl Search<'_> {
     }
 }
 
-/// Slope of the holdout's residuals without a term regressed on their change by the term, over the slope's standard deviation from the scatter over
-/// blocks.
+/// Slope of a regression, over `joints`, of the holdout residuals without a term on the part of them that the term removes, divided by the slope's
+/// standard deviation from the scatter over blocks.
 fn confirmed(joints: &[usize], weights: &[f64], rows: &Rows, [without, with]: [&Fitted; 2]) -> f64 {
     let mut information = 0.0;
     let mut product = 0.0;
@@ -120,7 +121,7 @@ fn confirmed(joints: &[usize], weights: &[f64], rows: &Rows, [without, with]: [&
     slope * information / (small_sample * scatter).sqrt().max(f64::MIN_POSITIVE)
 }
 
-/// RMS of a torque signal relative to the torque of the joint it acts on, of the joint with the largest ratio.
+/// RMS of a torque signal relative to the RMS torque of the joint that it acts on, for the joint with the largest ratio.
 pub(in crate::serial) fn consequence(rows: &Rows, signal: &Signal) -> f64 {
     let square = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>();
     let of = |(rows, s): (&JointRows, &Option<Vec<f64>>)| match s {
@@ -130,7 +131,7 @@ pub(in crate::serial) fn consequence(rows: &Rows, signal: &Signal) -> f64 {
     rows.joints.iter().zip(signal).map(of).fold(0.0, f64::max)
 }
 
-/// Share of resamples of the blocks of training logs and holdout in which a model costs less than every rival, 0 to 1.
+/// Share of resamples of the blocks of training logs and holdout in which a model costs less than each of the models `rivals`, 0 to 1.
 pub(in crate::serial) fn stability(model: &Fitted, rivals: &[&Fitted], seed: u64) -> f64 {
     let by_block = |fitted: &Fitted| -> Vec<f64> {
         fitted
@@ -158,9 +159,9 @@ pub(in crate::serial) fn stability(model: &Fitted, rivals: &[&Fitted], seed: u64
     wins as f64 / RESAMPLES as f64
 }
 
-/// Probability that a term is not merely a substitute for an effect missing in the library: part of a joint's holdout cost that the term removes,
-/// over this part plus the cost left above noise (`floor`, by joint); for a term that restores the arm file's values, from the decrease of the
-/// prior's cost.
+/// Probability that a term is not merely a substitute for an effect missing in the library: the larger of two numbers. One is the part of a joint's
+/// holdout cost that the term removes, over this part plus the cost left above that of noise (`floor`, by joint); the other grows with the decrease
+/// of the parameters' distance from the arm file's values.
 pub(in crate::serial) fn trust(without: &Fitted, with: &Fitted, evidence: &Evidence, floor: &[f64]) -> f64 {
     let joint = |set: &Fitted, j: usize| set.costs[1][j].iter().sum::<f64>();
     let own = (0..floor.len()).max_by(|a, b| {

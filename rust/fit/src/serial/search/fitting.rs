@@ -43,7 +43,7 @@ impl Fitted {
 }
 
 impl Search<'_> {
-    /// Sum of the torques of terms along logs at the arm's parameters `theta`, by joint and row, N m or N.
+    /// Sum of the torques of `terms` along the logs of `motion` at the arm's parameters `theta`, by joint and row, N m or N.
     pub(in crate::serial) fn beside(&self, motion: &dyn Motion, terms: &[Term], theta: &[f64]) -> Signal {
         if terms.is_empty() {
             return vec![None; self.rotary.len()];
@@ -154,7 +154,8 @@ impl Search<'_> {
         term.joints().first().is_none_or(|j| self.rotary[j - 1])
     }
 
-    /// Terms with their parameters changed by the fraction `part` of a step, within the parameters' bounds.
+    /// Terms with their parameters changed by the fraction `part` of `step`, which holds a value per parameter, term after term; the parameters stay
+    /// within their bounds.
     pub(in crate::serial) fn moved(&self, terms: &[Term], step: &[f64], part: f64) -> Vec<Term> {
         let mut rest = step;
         terms
@@ -167,7 +168,8 @@ impl Search<'_> {
             .collect()
     }
 
-    /// A term with its parameters changed by the fraction `part` of a step, within the parameters' bounds.
+    /// A term with its parameters changed by the fraction `part` of `step`, which holds a value per parameter; the parameters stay within their
+    /// bounds.
     fn moved_one(&self, term: &Term, step: &[f64], part: f64) -> Term {
         let bounds = term.parameters(self.rotary_of(term));
         let p = term.p.iter().zip(&bounds).enumerate().map(|(i, (p, b))| {
@@ -185,7 +187,7 @@ impl Search<'_> {
         term.with(p.collect())
     }
 
-    /// Derivatives of the terms' torques along the training logs by each of their parameters, by joint and row.
+    /// Derivatives of the terms' torques along the training logs, one for each parameter of the terms, each by joint and row of the weak form.
     pub(in crate::serial) fn derivatives(&self, terms: &[Term], theta: &[f64]) -> Vec<Signal> {
         let places: Vec<(usize, usize)> =
             terms.iter().enumerate().flat_map(|(i, t)| (0..t.p.len()).map(move |k| (i, k))).collect();
@@ -209,7 +211,8 @@ impl Search<'_> {
         terms.iter().flat_map(|term| self.ridge_of(term, term.p.len())).collect()
     }
 
-    /// Prior precision of the first `columns` parameters of a term: of a link from the arm file's standard deviations, of laws zero.
+    /// Prior precision (inverse variance) of the first `columns` parameters of a term: for a changed link from the arm file's standard deviations,
+    /// for parameters that are not estimated so large that they stay zero, else zero.
     pub(in crate::serial) fn ridge_of(&self, term: &Term, columns: usize) -> Vec<f64> {
         match term.kind {
             TermKind::NominalLink(link) => {

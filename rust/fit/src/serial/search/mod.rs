@@ -33,7 +33,7 @@ pub struct Search<'a> {
     pub prior: &'a Prior,
     /// Candidate terms at their initial guesses; one group holds the guesses of one effect on one joint or pair of joints, or on the whole arm.
     pub candidates: Vec<Vec<Term>>,
-    /// Whether each joint is rotary; else it is linear.
+    /// Whether each joint is rotary; a joint that is not is linear.
     pub rotary: Vec<bool>,
     /// Sample period, s. A delay or lag below it is an artefact of how torques and positions were sampled, and is not named.
     pub period: f64,
@@ -43,7 +43,8 @@ pub struct Search<'a> {
     pub progress: &'a ProgressReporter,
 }
 
-/// A term of the final model with its uncertainty, evidence, probability and look-alikes.
+/// A term of the final model with its standard deviations, the comparison of the models with and without the term, its probability and its
+/// look-alikes.
 #[derive(Debug, Clone)]
 pub struct Named {
     /// Term of the final model, with fitted values.
@@ -63,9 +64,9 @@ pub struct Named {
 pub struct Tested {
     /// Candidate term at the best of its initial guesses.
     pub term: Term,
-    /// Estimated size of the candidate and the size's robust standard deviation, both as multiples of the term's values.
+    /// Estimated size of the candidate and the size's robust standard deviation, both as factors on the torque of the term at its values.
     pub size: [f64; 2],
-    /// RMS torque of the candidate at size 1 relative to the torque of the joint it acts on.
+    /// RMS torque of the candidate at its values relative to the RMS torque of its joint; of several joints, the largest ratio.
     pub consequence: f64,
 }
 
@@ -77,7 +78,7 @@ pub struct Found {
     pub refit_feasible: Fitted,
     /// The final model with all terms that the search accepted.
     pub model: Fitted,
-    /// Terms of the final model, by decreasing gain on training logs and holdout.
+    /// Terms of the final model, by the decrease of the cost on training logs and holdout that each brings, largest first.
     pub named: Vec<Named>,
     /// The model with only those terms that are probable enough to be named, for predictions.
     pub reported: Fitted,
@@ -88,7 +89,7 @@ pub struct Found {
 }
 
 impl Search<'_> {
-    /// Runs the model search with at most `most` additions of a term; `seed` is of the resampling of blocks.
+    /// Runs the model search with at most `most` additions of a term; `seed` starts the random numbers with which blocks of the logs are resampled.
     pub fn run(&self, most: usize, seed: u64) -> Found {
         self.progress.begin(Phase::Refit, 1);
         let none = vec![None; self.rotary.len()];
@@ -111,7 +112,7 @@ impl Search<'_> {
         self.concluded(&guesses, &regression, [refit, model], sigma, seed)
     }
 
-    /// The term whose addition gives the accepted model of least total cost; none where no candidate is accepted.
+    /// The term whose addition gives the accepted model of least [`Fitted::total`]; `None` where no candidate is accepted.
     fn best_addition(&self, guesses: &[Vec<Guess>], regression: &Regression, model: &Fitted) -> Option<Term> {
         let screened = self.screened(guesses, regression, model);
         let single = self.finalists(regression, model, &screened);
@@ -123,7 +124,7 @@ impl Search<'_> {
         Some(best.terms[last].clone())
     }
 
-    /// Whether the term of index `index` in the model `with` is accepted, compared with the model `without` the term.
+    /// Whether the term of index `index` in the model `with` is accepted, compared with the model `without` that term.
     pub(in crate::serial) fn is_accepted(
         &self,
         regression: &Regression,
@@ -145,7 +146,7 @@ impl Search<'_> {
         self.fit(regression, terms, &model.estimate.theta)
     }
 
-    /// The model without the terms, before the last one, that are no longer accepted beside the model's other terms.
+    /// The model without those of its terms, the last one excepted, that are no longer accepted beside the model's other terms.
     fn without_idle(&self, regression: &Regression, model: Fitted) -> Fitted {
         let mut model = model;
         let mut index = 0;

@@ -10,10 +10,11 @@ use crate::serial::weak_form::rows::{Estimate, Regression, Signal};
 use armgap_core::effect::Trial;
 use rayon::prelude::*;
 
-/// Multiple of a term's initial guess up to which a first-order test may move the term's parameters.
+/// Largest factor that a first-order test may suggest on the distance of a term's initial guess from the values at which the term has no effect.
 const FARTHEST: f64 = 50.0;
 
-/// Tilt of the base in the numerical derivative of its first-order test, rad; the torque of a tilt is smooth.
+/// Tilt of the base over which the first-order test of a tilt takes numerical derivatives of torques, rad; these torques are smooth functions of the
+/// tilt.
 const TILT_STEP: f64 = 1e-3;
 
 /// A candidate term at an initial guess, with the torque signals of its first-order test along the training logs.
@@ -64,7 +65,8 @@ impl Search<'_> {
     }
 
     /// Effective number of a term's parameters (Moody 1992). Of a link or payload, which the arm's parameters can imitate, only directions that the
-    /// logs determine better than the arm file count: `trace(I diag(sigma)^2)`, `I` the information on the term's sizes beside the arm's parameters.
+    /// logs determine better than the arm file count: `trace(I diag(sigma)^2)` with `sigma` the arm file's standard deviations and `I` the
+    /// information on the term's parameters beside the arm's parameters.
     fn degrees(&self, regression: &Regression, at: &Estimate, term: &Term, columns: &[Signal]) -> f64 {
         let link = match term.kind {
             TermKind::NominalLink(link) => link,
@@ -79,7 +81,8 @@ impl Search<'_> {
         })
     }
 
-    /// Tests a term to first order; returns the term with the values that the test suggests, and the decrease of the cost.
+    /// Tests a term to first order; returns the term with the values that the test suggests, and by how much they lower the cost, or `None` if they
+    /// lie out of bounds or do not lower it.
     pub(in crate::serial) fn test(
         &self,
         regression: &Regression,
@@ -190,7 +193,7 @@ impl Search<'_> {
         found
     }
 
-    /// Fitted models with one more term each: one for each of the best candidates of the screening.
+    /// Models with one more term each, fitted: one for each of the candidates that lower the cost most in the first-order tests `screened`.
     pub(in crate::serial) fn finalists(
         &self,
         regression: &Regression,
@@ -212,7 +215,8 @@ impl Search<'_> {
     }
 }
 
-/// First-order test of the inertia and friction of a transmission that couples two joints; parameters that would be negative are set to zero.
+/// First-order test of the inertia and friction of a transmission that couples two joints, with parameters that would be negative set to zero;
+/// returns the term with the values that the test suggests, and by how much they lower the cost.
 fn test_row(regression: &Regression, at: &Estimate, guess: &Guess, row: RowTerm) -> Option<(Term, f64)> {
     let mut free: Vec<usize> = (0..guess.columns.len()).collect();
     loop {

@@ -27,7 +27,7 @@ impl Setting {
     /// All settings of a position controller that may be wrong.
     pub const ALL: [Self; 3] = [Self::Gain, Self::Damping, Self::ReferenceDelay];
 
-    /// Name of the term with this setting in results.
+    /// Name in results of the term that changes this setting.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Gain => "controller_gain",
@@ -36,7 +36,7 @@ impl Setting {
         }
     }
 
-    /// Name of the term with this setting in reports.
+    /// Title in reports of the term that changes this setting.
     pub const fn title(self) -> &'static str {
         match self {
             Self::Gain => "wrong proportional gain of the position controller",
@@ -74,7 +74,8 @@ impl Setting {
 }
 
 impl ControllerTerm {
-    /// A joint's controller with the term's setting changed by `value`: the factor of a gain, else the difference.
+    /// A joint's controller with the term's setting changed by `value`: a factor on the proportional gain, or what is added to the derivative gain or
+    /// the delay of the reference.
     pub fn on(&self, controller: &JointController, value: f64) -> JointController {
         let mut changed = *controller;
         match self.setting {

@@ -36,7 +36,7 @@ pub enum TermKind {
     BaseTilt,
     /// Difference of a link's mass, first moments and inertia from the nominal values; the number is the link's 0-based index.
     NominalLink(usize),
-    /// Joint elasticity or backlash of a transmission; the parameter is the compliance or the gap.
+    /// Joint elasticity or backlash of a transmission; the parameter is the compliance, rad/(N m) (m/N), or the gap, rad (m).
     Transmission(TransmissionLaw),
     /// A setting of a joint's position controller that differs from the arm file.
     Controller(ControllerTerm),
@@ -57,7 +57,8 @@ pub struct TermParameter {
     pub bounds: [f64; 2],
     /// Value of the parameter at which the term has no effect, SI.
     pub neutral: f64,
-    /// Name and unit of the parameter's inverse (stiffness of a compliance), where results state the inverse.
+    /// Name and unit of the parameter's inverse (stiffness of a compliance), where results state the inverse; `None` where they state the parameter
+    /// itself.
     pub inverse: Option<(&'static str, &'static str)>,
 }
 
@@ -85,7 +86,7 @@ impl Term {
         Self { kind, p: vec![0.0; count], degrees: count as f64 }
     }
 
-    /// Name of the term in results.
+    /// Name of the term in results, such as `base_tilt`.
     pub fn name(&self) -> &'static str {
         match self.kind {
             TermKind::Law(effect) => effect.law.spec().name,
@@ -99,7 +100,7 @@ impl Term {
         }
     }
 
-    /// Name of the term in reports.
+    /// Title of the term in reports, such as `base not level`.
     pub fn title(&self) -> &'static str {
         match self.kind {
             TermKind::Law(effect) => effect.law.spec().title,
@@ -113,7 +114,7 @@ impl Term {
         }
     }
 
-    /// 1-based joint of the term; of a link, the joint that moves the link; none for a term on several joints or the whole arm.
+    /// 1-based joint of the term; of a link, the joint that moves the link; `None` for a term on several joints or the whole arm.
     pub fn joint(&self) -> Option<usize> {
         match self.kind {
             TermKind::Law(effect) => effect.joint_number(),
@@ -124,7 +125,8 @@ impl Term {
         }
     }
 
-    /// Factors (1 and 1, or 1 and -1) of two adjacent joints' positions in the combination that a term acts along; none for other kinds.
+    /// Factors (1 and 1, or 1 and -1) of two adjacent joints' positions in the sum or difference that the term acts along; `None` for terms of other
+    /// kinds.
     pub fn row(&self) -> Option<[i32; 2]> {
         if let TermKind::Row(row) = self.kind { Some(row.row()) } else { None }
     }
@@ -145,8 +147,8 @@ impl Term {
         self.name() == other.name() && self.row() == other.row() && (own == others || overlap)
     }
 
-    /// Whether the term can explain all that `other` explains, whatever the motion: a changed last link a payload, and a payload a heavier last link.
-    /// `links` is the number of links of the arm.
+    /// Whether the term can explain all that `other` explains, whatever the motion: a changed last link explains what a payload does, and a payload
+    /// what a heavier last link does. `links` is the number of links of the arm.
     pub fn includes(&self, other: &Self, links: usize) -> bool {
         match (&self.kind, &other.kind) {
             (TermKind::NominalLink(link), TermKind::Payload) => *link + 1 == links,
@@ -195,8 +197,8 @@ impl Term {
         }
     }
 
-    /// Number of leading parameters in which the term's torque is linear and which switch the term off together; 0 where the torque is linear in
-    /// none.
+    /// Number of leading parameters in which the term's torque is linear and with which it vanishes when all of them are at their neutral values; 0
+    /// where the torque is linear in no parameter.
     pub fn amplitudes(&self) -> usize {
         match self.kind {
             TermKind::Law(effect) => {
@@ -240,7 +242,8 @@ impl Term {
         effect.law.spec().hooks.command || depends(&effect, |x, value| x.tau = value)
     }
 
-    /// Factor on the controller's torque, of a term on the proportional gain; none for other terms (a derivative gain acts like viscous friction).
+    /// Factor by which a changed proportional gain multiplies the controller's torque; `None` for other terms (a derivative gain acts like viscous
+    /// friction).
     pub fn share_of_command(&self) -> Option<f64> {
         matches!(self.kind, TermKind::Controller(of) if of.setting == Setting::Gain).then(|| self.p[0])
     }
@@ -272,7 +275,7 @@ impl Term {
         Self { kind: self.kind.clone(), p, degrees: self.degrees }
     }
 
-    /// The library's effect with the term's values; none for a term that is no effect of the library on one joint.
+    /// The library's effect with the term's values; `None` for a term that is no effect of the library on one joint.
     pub fn effect(&self) -> Option<EffectInstance> {
         let TermKind::Law(mut effect) = self.kind else { return None };
         for (slot, value) in effect.p.iter_mut().zip(&self.p) {

@@ -27,14 +27,15 @@ pub struct RowTerm {
 /// Law of the torque along a sum or a difference of two joints' positions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum RowLaw {
-    /// Inertia, viscous and Coulomb friction of a coupled transmission; each flag is whether that parameter is estimated, else it is zero.
+    /// Inertia, viscous and Coulomb friction of a coupled transmission; each of the three flags tells whether that parameter is estimated; else the
+    /// parameter is zero.
     Transmission([bool; 3]),
-    /// A linear spring with a stiffness and a rest position.
+    /// A linear spring with a stiffness, N m/rad (N/m), and a rest position, rad (m), of the sum or difference of the joints' positions.
     Spring,
 }
 
 impl RowTerm {
-    /// Name of the term in results.
+    /// Name of the term in results, such as `joint_spring`.
     pub fn name(&self) -> &'static str {
         match self.law {
             RowLaw::Transmission(_) => "coupled_transmission",
@@ -42,7 +43,7 @@ impl RowTerm {
         }
     }
 
-    /// Name of the term in reports.
+    /// Title of the term in reports, such as `spring across two joints`.
     pub fn title(&self) -> &'static str {
         match self.law {
             RowLaw::Transmission(_) => "transmission that couples two joints",
@@ -58,7 +59,7 @@ impl RowTerm {
         }
     }
 
-    /// Factors of the two joints' positions in the combination that the term acts along: 1 and 1, or 1 and -1.
+    /// Factors of the two adjacent joints' positions in the sum or difference that the term acts along: 1 and 1, or 1 and -1.
     pub fn row(&self) -> [i32; 2] {
         [1, if self.factor > 0.0 { 1 } else { -1 }]
     }
@@ -87,7 +88,8 @@ impl RowTerm {
         units.iter().map(of).collect()
     }
 
-    /// Momentum, and torque without the momentum's derivative, along `q_j + factor q_k` in the middle of a sample interval, at parameters `p`.
+    /// Momentum, N m s (N s), and torque without the momentum's derivative, N m (N), along `q_j + factor q_k` in the middle of a sample interval, at
+    /// parameters `p`.
     fn along<const N: usize>(&self, m: &Middle<N>, p: &[f64]) -> [f64; 2] {
         let of = |x: &[f64; N]| x[self.first] + self.factor * x[self.first + 1];
         match self.law {
@@ -124,7 +126,7 @@ pub fn candidates(kinds: &[JointKind]) -> Vec<Vec<Term>> {
 }
 
 impl<const N: usize, const P: usize> Equation<N, P> {
-    /// Torque of a term along a sum or a difference of two joints, at parameters `p`, by joint and row of the weak form, N m or N.
+    /// Torque of a term along the sum or the difference of two joints' positions, at parameters `p`, by joint and row of the weak form, N m or N.
     pub(in crate::serial) fn of_row(&self, row: &RowTerm, p: &[f64]) -> Signal {
         let changes: Vec<Vec<[SVector<f64, N>; 2]>> = self
             .logs()
@@ -148,8 +150,8 @@ impl RowTerm {
     }
 }
 
-/// A copy of a log with the torques of given terms, at given parameters, subtracted along the measured motion, as the integrator cannot simulate
-/// them.
+/// A copy of a log with the torques of `rows`, terms on two coupled joints with their parameters, subtracted along the measured motion, as the
+/// integrator cannot simulate such terms.
 pub fn without_rows<const N: usize>(track: &Track<N>, rows: &[(RowTerm, Vec<f64>)]) -> Track<N> {
     let mut track = track.clone();
     let intervals = Intervals::new(&track);

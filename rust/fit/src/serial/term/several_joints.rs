@@ -2,7 +2,7 @@
 
 use crate::serial::term::{Term, TermKind};
 
-/// One law on several joints, as one term.
+/// One law on several joints, as one term of the model.
 #[derive(Debug, Clone)]
 pub struct SeveralJoints {
     /// The law on each of the term's joints, at initial values.
@@ -40,8 +40,8 @@ impl Term {
         of.members.iter().enumerate().map(|(i, member)| member.with(values(i))).collect()
     }
 
-    /// The term that parameter `k` belongs to and the parameter's index in it: the law on one joint where a law on several joints has values per
-    /// joint.
+    /// The term that a change of parameter `k` changes, and the parameter's index in it: the law on a single joint if every joint has values of its
+    /// own, else the whole term.
     pub fn moved_by(&self, k: usize) -> (Self, usize) {
         match &self.kind {
             TermKind::Joints(of) if !of.common => {

@@ -1,10 +1,10 @@
 //! Joint elasticity and backlash in the weak form: how a deflection between motor and link changes the equation of motion.
 //!
-//! The deflection between motor and link follows from the torque `T` that the transmission passes on: `T / stiffness` of a shaft (Spong 1987, without
-//! the damping), and half the gap towards the side that `T` pushes to of backlash (Nordin and Gutman 2002). Where the encoder measures the motor, `T`
-//! is the motor's torque less those of rotor inertia and friction, and the link's position is the motor's less the deflection; where the encoder
-//! measures the link, `T` is the torque of the links, and the motor's position, at which rotor inertia and friction act, is the link's plus the
-//! deflection.
+//! The deflection between motor and link follows from the torque `T` that the transmission passes on: `T / stiffness` for an elastic shaft (Spong
+//! 1987, without the damping), and, for backlash, half the gap towards the side that `T` pushes to (Nordin and Gutman 2002). Where the encoder
+//! measures the motor, `T` is the motor's torque less those of rotor inertia and friction, and the link's position is the motor's less the
+//! deflection; where the encoder measures the link, `T` is the torque of the links, and the motor's position, at which rotor inertia and friction
+//! act, is the link's plus the deflection.
 
 use crate::model::hypothesis::EffectInstance;
 use crate::serial::term::TermParameter;
@@ -20,7 +20,8 @@ use rayon::prelude::*;
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Largest displacement of a joint in numerical derivatives of torques by the deflection of a transmission, rad (m); torques are smooth in it.
+/// Largest displacement of a joint in numerical derivatives of torques by the deflection of a transmission, rad (m); torques are smooth functions of
+/// the displacement.
 const DISPLACEMENT: f64 = 1e-3;
 
 /// Elasticity or backlash of one joint's transmission.
@@ -39,7 +40,8 @@ pub struct TransmissionLaw {
 pub enum Compliance {
     /// Elastic shaft: the deflection is in proportion to the transmitted torque.
     Elastic,
-    /// Backlash: half the gap to the side of the torque; the value is the torque around zero within which the link crosses the gap, N m (N).
+    /// Backlash: the deflection is half the gap, to the side that the torque pushes to; the value is the torque around zero within which the link
+    /// crosses the gap, N m (N).
     Backlash(f64),
 }
 
@@ -53,10 +55,10 @@ impl Compliance {
     }
 }
 
-/// Damping ratio of an elastic joint in predictions; motion slower than the joint's oscillation does not determine it.
+/// Damping ratio that predictions assume for an elastic joint; motion slower than the joint's oscillation does not determine the damping.
 const DAMPING: f64 = 0.1;
 
-/// Rotor inertia relative to the joint's inertia, for predictions, of a motor without a rotor inertia in the arm file.
+/// Rotor inertia that predictions assume for a motor without one in the arm file, relative to the joint's inertia.
 const ROTOR_SHARE: f64 = 0.03;
 
 impl TransmissionLaw {
@@ -74,7 +76,7 @@ impl TransmissionLaw {
         self.effect().spec().name
     }
 
-    /// Name of the transmission term in reports.
+    /// Title of the transmission term in reports.
     pub fn title(&self) -> &'static str {
         self.effect().spec().title
     }
@@ -90,8 +92,8 @@ impl TransmissionLaw {
         TermParameter { name, unit, bounds: [0.0, f64::INFINITY], neutral: 0.0, inverse }
     }
 
-    /// The effect for simulation at a compliance or gap `size`, with the arm's `rotor` and the joint's `inertia`, and the rotor inertia moved into
-    /// the effect.
+    /// The effect that simulates a compliance, rad/(N m) (m/N), or a gap, rad (m), of `size`, and the part of the arm file's rotor inertia that the
+    /// effect takes over; `rotor` is that rotor inertia and `inertia` the joint's inertia, kg m^2 (kg).
     pub fn instance(&self, size: f64, rotor: f64, inertia: f64) -> (EffectInstance, f64) {
         let rotor_inertia = if rotor > 0.0 { rotor } else { ROTOR_SHARE * inertia };
         let (p, taken) = match self.compliance {
@@ -111,8 +113,8 @@ impl TransmissionLaw {
 }
 
 impl<const N: usize, const P: usize> Equation<N, P> {
-    /// Torque of a transmission with compliance, rad/(N m), or gap, rad, `size` by joint and row of the weak form: to first order, so in proportion
-    /// to `size`.
+    /// Torque by joint and row of the weak form, N m or N, due to the deflection of a transmission with a compliance, rad/(N m) (m/N), or a gap, rad
+    /// (m), of `size`: to first order, so in proportion to `size`.
     pub(in crate::serial) fn of_transmission(
         &self,
         law: &TransmissionLaw,
@@ -126,7 +128,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         unit.iter().map(|s| s.as_ref().map(|s| s.iter().map(|x| size * x).collect())).collect()
     }
 
-    /// Torque of a transmission by joint and row of the weak form, to first order, per unit of compliance or gap.
+    /// Torque by joint and row of the weak form due to the deflection of a transmission, to first order, per unit of compliance or gap.
     fn of_unit(&self, law: &TransmissionLaw, theta: &[f64; P]) -> Signal {
         let j = law.joint;
         let mut links = *theta;
@@ -153,7 +155,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         }
     }
 
-    /// Torque that the motor of joint `j` passes on along the measured motion, N m or N: its torque less those of rotor inertia and friction.
+    /// Torque that the motor of joint `j` passes on along the measured motion, N m or N: the motor's torque less those of rotor inertia and friction.
     fn motor_torque(&self, m: &Middle<N>, j: usize, theta: &[f64; P]) -> f64 {
         let friction = self.arm.friction(theta, &SVector::from(m.dq))[j];
         m.tau[j] - theta[10 * N + j] * m.ddq[j] - friction
@@ -166,7 +168,8 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         inertia * SVector::from(m.ddq) + SVector::from(bias)
     }
 
-    /// Change of the links' torque where the encoder of joint `j` measures the motor and the link is behind by the deflection, to first order.
+    /// Change of the links' torque by joint and row of the weak form, to first order, where the encoder of joint `j` measures the motor and the link
+    /// is behind by the deflection; `deflections` holds deflection and rate by log and sample interval.
     fn behind_motors(&self, j: usize, deflections: &[Vec<[f64; 2]>], links: &[f64; P]) -> Signal {
         let largest = deflections.iter().flatten().fold(0.0, |a: f64, d| a.max(d[0].abs()));
         if largest == 0.0 {
@@ -195,8 +198,8 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         self.weak_parts(&changes)
     }
 
-    /// Change of the torque of rotor inertia and viscous friction where the encoder of joint `j` measures the link and the motor leads by the
-    /// deflection.
+    /// Change of the torque of rotor inertia and viscous friction, by joint and row of the weak form, where the encoder of joint `j` measures the
+    /// link and the motor leads by the deflection; `deflections` holds deflection and rate by log and sample interval.
     fn of_motor(&self, j: usize, deflections: &[Vec<[f64; 2]>], theta: &[f64; P]) -> Signal {
         let (rotor, viscous) = (theta[10 * N + j], self.arm.viscous(theta)[j]);
         if rotor == 0.0 && viscous == 0.0 {

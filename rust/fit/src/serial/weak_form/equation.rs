@@ -41,11 +41,11 @@ pub struct Equation<const N: usize, const P: usize> {
     pub(in crate::serial) kept: Vec<Vec<usize>>,
     /// Cached torque signals of elastic joints and backlash.
     pub(in crate::serial) computed: Computed<P>,
-    /// Position controllers that command the torques in logs with references; none for logs with torques.
+    /// Position controllers that command the torques in logs with references; `None` for logs with torques.
     pub(in crate::serial) commanded: Option<Commanded<N>>,
 }
 
-/// Torques by joint, log and sample interval, N m or N; none for joints that a term does not act on.
+/// Torques by joint, log and sample interval, N m or N; `None` for joints that a term does not act on.
 pub(in crate::serial) type Torques<const N: usize> = [Option<Vec<Vec<f64>>>; N];
 
 impl<const N: usize, const P: usize> Equation<N, P> {
@@ -195,8 +195,8 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         signal
     }
 
-    /// Torque of a term by joint and row of the weak form, N m or N, like [`Self::signal`] but with the mean over each log, also for joints with an
-    /// integral controller.
+    /// Torque of a term by joint and row of the weak form, N m or N, like [`Self::signal`], but without subtraction of the mean over each log for
+    /// joints whose controller has an integral part.
     pub(in crate::serial) fn signal_with_mean(&self, term: &Term, theta: &[f64; P]) -> Signal {
         match term.kind {
             TermKind::Law(_) => match term.effect() {
@@ -228,7 +228,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         self.rows.joints.iter().enumerate().map(joint).collect()
     }
 
-    /// Torques weighted by the test functions, by joint and row of the weak form.
+    /// Torques averaged with the test functions as weights, by joint and row of the weak form, N m or N.
     pub(in crate::serial) fn weak(&self, torques: &Torques<N>) -> Signal {
         let joint = |j: usize| {
             torques[j].as_ref().map(|torque| {
@@ -378,13 +378,14 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         total.map(|t| t / count).to_vec()
     }
 
-    /// Evenly spaced sample intervals along the logs, some 200.
+    /// Middles of some 200 sample intervals, evenly spaced along the logs.
     fn poses(&self) -> impl Iterator<Item = &Middle<N>> {
         let stride = (self.logs.iter().map(|log| log.middles.len()).sum::<usize>() / POSES).max(1);
         self.logs.iter().flat_map(move |log| log.middles.iter().step_by(stride))
     }
 
-    /// Smallest eigenvalue of the inertia matrix scaled to unit diagonal, the least along the logs; -1 where a diagonal entry is not positive.
+    /// Smallest eigenvalue of the inertia matrix scaled to unit diagonal, at the pose along the logs where it is smallest; -1 where a diagonal entry
+    /// is not positive.
     pub fn conditioning(&self, theta: &[f64; P]) -> f64 {
         let smallest = |m: &Middle<N>| {
             let inertia = self.arm.inertia(theta, &SVector::from(m.q));
@@ -398,7 +399,8 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         self.poses().map(smallest).fold(1.0, f64::min)
     }
 
-    /// Momentum `M dq`, and the torque without the momentum's derivative, `C dq + g - dM/dt dq` plus friction, in a sample interval.
+    /// Momentum `M dq`, and the torque without the momentum's derivative, `C dq + g - dM/dt dq` plus friction, N m s (N s) and N m (N), in the middle
+    /// of a sample interval.
     pub(in crate::serial) fn parts(&self, m: &Middle<N>, theta: &[f64; P]) -> [SVector<f64, N>; 2] {
         let (q, dq) = (SVector::from(m.q), SVector::from(m.dq));
         let momentum = self.arm.inertia(theta, &q) * SVector::from(m.mean_dq);

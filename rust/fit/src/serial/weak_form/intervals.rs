@@ -28,10 +28,10 @@ const SPACING: f64 = 0.5;
 const AT_REST: f64 = 3.0;
 
 /// Speed, relative to a joint's RMS speed, below which the joint counts as at rest: before it slides, it may creep under a torque below its Coulomb
-/// level. At a reversal with a tenth of the largest acceleration a joint is as slow for some milliseconds.
+/// level. At a reversal with a tenth of the largest acceleration a joint is this slow for only some milliseconds.
 const SLOW: f64 = 0.01;
 
-/// Time between two samples, in sample periods, beyond which a stretch of a log ends.
+/// Time between two samples, in sample periods, beyond which the log counts as interrupted: no test function reaches across.
 const GAP: f64 = 3.5;
 
 /// State in the middle of a sample interval and mean torque over it, by joint.
@@ -157,9 +157,11 @@ impl TestFunction {
         self.value(m.t + 0.5 * m.h) - self.value(m.t - 0.5 * m.h)
     }
 
-    /// Factors on the measured positions in a row of the weak form, sample by sample from the start of the test function's first interval on.
+    /// Derivatives of a row of the weak form by the measured positions, N m/rad (N/m), sample by sample from the start of the test function's first
+    /// interval on.
     ///
-    /// The row's momentum is `momentum` times the mean velocity, and its torque `stiffness` times the position plus `damping` times the velocity.
+    /// The momentum in the row is `momentum`, an inertia, kg m^2 (kg), times the mean velocity, and the torque in the row is `stiffness`, N m/rad
+    /// (N/m), times the position plus `damping`, N m s/rad (N s/m), times the velocity.
     pub fn on_positions<const N: usize>(
         &self,
         middles: &[Middle<N>],

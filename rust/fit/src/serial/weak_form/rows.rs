@@ -12,11 +12,11 @@ const WEIGHT_ROUNDS: usize = 4;
 /// Rows of one joint in the weak form: `y = psi theta + torques of terms`, one row per test function.
 #[derive(Debug, Clone)]
 pub struct JointRows {
-    /// Torque, one value per row, N m or N.
+    /// Applied torque of the joint, averaged with each test function as weight, one value per row, N m or N.
     pub y: Vec<f64>,
-    /// Regressor, one row per row of `y`, row by row.
+    /// Regressor of the parameters, row after row: [`Rows::parameters`] entries for each value of `y`.
     pub psi: Vec<f64>,
-    /// Index of the block, a stretch of one second, that each row belongs to.
+    /// Index of the block, a stretch of one second of a log, that each row belongs to.
     pub block: Vec<usize>,
     /// Standard deviation of each row due to the noise of positions, N m or N.
     pub floor: Vec<f64>,
@@ -33,7 +33,7 @@ pub struct Rows {
     pub blocks: usize,
 }
 
-/// Torque added to that of the arm's own parameters, by joint and row of the weak form, N m or N; none for joints that the torque does not act on.
+/// Torque added to that of the arm's own parameters, by joint and row of the weak form, N m or N; `None` for joints that the torque does not act on.
 pub type Signal = Vec<Option<Vec<f64>>>;
 
 /// Gaussian prior of the regression's parameters, with the parameters that may not be negative.
@@ -90,8 +90,8 @@ impl Rows {
         self.joints.iter().zip(beside).map(|(rows, s)| rows.residual(theta, s.as_ref())).collect()
     }
 
-    /// Weight of each joint's rows, 1/(N m)^2 or 1/N^2: the inverse of the residuals' variance times the number of correlated rows that count as one.
-    /// A joint without rows has weight zero.
+    /// Weight of each joint's rows, 1/(N m)^2 or 1/N^2: one over the product of the residuals' variance, at least that of the position noise, and the
+    /// number of correlated rows that count as one. A joint without rows has weight zero.
     pub fn weights(&self, residual: &[Vec<f64>]) -> Vec<f64> {
         let of = |(rows, r): (&JointRows, &Vec<f64>)| {
             let n = r.len() as f64;
@@ -103,7 +103,7 @@ impl Rows {
         self.joints.iter().zip(residual).map(of).collect()
     }
 
-    /// Weighted squared residuals by joint and block.
+    /// Sum of the weighted squared residuals by joint and block, a stretch of one second.
     pub fn costs(&self, weights: &[f64], residual: &[Vec<f64>]) -> Vec<Vec<f64>> {
         let of = |j: usize| {
             let mut cost = vec![0.0; self.blocks];
@@ -143,7 +143,7 @@ pub struct Regression<'a> {
     normal: DMatrix<f64>,
 }
 
-/// Estimated parameters of a regression with a given further torque.
+/// Parameters estimated by a regression in which a given torque is added to that of the parameters.
 #[derive(Debug, Clone)]
 pub struct Estimate {
     /// Estimated parameters, SI.
@@ -168,7 +168,7 @@ impl<'a> Regression<'a> {
         Self { rows, prior, weights, normal }
     }
 
-    /// A regression with weights of the rows from the residuals of an estimate with the further torque `beside`.
+    /// A regression whose weights follow from the residuals of an estimate with the torque `beside` added to that of the parameters.
     pub fn reweighted(rows: &'a Rows, prior: &'a Prior, beside: &Signal) -> Self {
         let scale = |rows: &JointRows| {
             let square = rows.y.iter().map(|y| y * y).sum::<f64>() / rows.y.len().max(1) as f64;
@@ -205,8 +205,8 @@ impl<'a> Regression<'a> {
         (0..a.len()).map(of).sum()
     }
 
-    /// Cholesky factor of the normal matrix plus the prior's precision, with the rows and columns of `held` parameters replaced by the identity; none
-    /// if the matrix is not positive definite.
+    /// Cholesky factor of the normal matrix plus the prior's precision, with the rows and columns of `held` parameters replaced by the identity;
+    /// `None` if the matrix is not positive definite.
     fn system(&self, held: &[bool]) -> Option<nalgebra::Cholesky<f64, nalgebra::Dyn>> {
         let mut system = self.normal.clone();
         let p = self.rows.parameters;
@@ -227,7 +227,7 @@ impl<'a> Regression<'a> {
         self.prior.sigma.iter().map(|s| *s <= 0.0).collect()
     }
 
-    /// Estimated parameters with the further torque `beside`; coefficients that may not be negative and would be are held at zero.
+    /// Estimates the parameters with the torque `beside` added to theirs; coefficients that would be negative and may not be are held at zero.
     pub fn estimate(&self, beside: &Signal) -> Estimate {
         let p = self.rows.parameters;
         let torque: Signal = self
@@ -278,8 +278,9 @@ impl<'a> Regression<'a> {
         Estimate { theta: value, residual, cost: data + prior_cost, prior_cost }
     }
 
-    /// First-order test of further torques (`columns`) against the residual of the estimate `at`, with the parameters re-estimated at the same time;
-    /// `ridge` is the prior precision (inverse variance) of each torque's size around zero. None if a matrix is singular.
+    /// First-order (score) test of further torques, each of size 1 in `columns`, against the residual of the estimate `at`, with the parameters
+    /// re-estimated at the same time; `ridge` is the prior precision (inverse variance) of each torque's size around zero. `None` if a matrix is
+    /// singular.
     pub fn score(&self, at: &Estimate, columns: &[Signal], ridge: &[f64]) -> Option<Score> {
         let k = columns.len();
         let fixed = self.fixed();
@@ -302,8 +303,8 @@ impl<'a> Regression<'a> {
         Some(Score { size: size.iter().copied().collect(), gain, information, inverse, solved })
     }
 
-    /// Covariance of the sizes of further torques (`columns`) from the scatter of their scores over blocks, at an estimate that includes the torques:
-    /// robust to correlated residuals (sandwich estimator).
+    /// Covariance of the sizes of further torques, each of size 1 in `columns`, from the scatter of their scores over blocks, at an estimate that
+    /// includes the torques: robust to correlated residuals (sandwich estimator).
     pub fn sandwich(&self, at: &Estimate, columns: &[Signal], score: &Score) -> DMatrix<f64> {
         let (k, p) = (columns.len(), self.rows.parameters);
         let mut blocks = vec![DVector::<f64>::zeros(k); self.rows.blocks];
@@ -355,10 +356,10 @@ impl Score {
     }
 }
 
-/// Result of a first-order test of further torques.
+/// Result of a first-order test of torques that are added to that of the parameters.
 #[derive(Debug, Clone)]
 pub struct Score {
-    /// Estimated sizes of the tested torques.
+    /// Estimated sizes of the tested torques, as factors on these torques.
     pub size: Vec<f64>,
     /// Decrease of the cost, to first order, when the tested torques are added.
     pub gain: f64,
