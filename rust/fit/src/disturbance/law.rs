@@ -39,6 +39,9 @@ const HALF_SINE: f64 = 1.3;
 /// First guess of a stop's damping: damping torque at the push's mean speed relative to the mean torque.
 const DAMPED: f64 = 0.1;
 
+/// Least ratio of a stop's largest elastic torque to its largest damping torque: a free mass that meets a stop of the damping ratio `z` has `1 / (2 z)`.
+const ELASTIC: f64 = 0.2;
+
 /// Effect of the library whose action can be mistaken for a push.
 struct LawGuess {
     name: &'static str,
@@ -274,7 +277,7 @@ fn stop_guess(motion: &PushedMotion<'_>) -> Option<[f64; MAX_PARAMETERS]> {
     Some([side * position, HALF_SINE * torque / depth, DAMPED * torque * half / depth])
 }
 
-/// Whether a stop takes up more of a motion beyond it by its stiffness than by its damping: what only brakes a joint beyond a position is no stop.
+/// Whether a stop's stiffness takes up a part of the motion beyond it: what only brakes a joint beyond a position is no stop.
 fn is_elastic(
     &[position, stiffness, damping, ..]: &[f64; MAX_PARAMETERS],
     motion: &PushedMotion<'_>,
@@ -283,7 +286,7 @@ fn is_elastic(
     let deepest = motion.q.iter().map(depth).fold(0.0, f64::max);
     let rates = motion.t.windows(2).zip(motion.q.windows(2)).filter(|(_, q)| depth(&q[1]) > 0.0);
     let fastest = rates.map(|(t, q)| (q[1] - q[0]).abs() / (t[1] - t[0]).max(1e-9)).fold(0.0, f64::max);
-    stiffness * deepest > damping * fastest
+    stiffness * deepest > ELASTIC * damping * fastest
 }
 
 #[cfg(test)]
