@@ -7,7 +7,7 @@
 //! information criterion, Schwarz 1978). Each push has three values, an effect a fixed number however often it acts.
 
 use super::push::Disturbance;
-use crate::likelihood::context::DiagnosisContext;
+use crate::likelihood::context::{DiagnosisContext, WindowSet};
 use crate::likelihood::solve::{Effort, Fit};
 use crate::likelihood::weighting::Weighting;
 use crate::log::track::Track;
@@ -192,18 +192,20 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         self.on_windows(self.training.data.clone().and(self.holdout.data.clone()))
     }
 
-    /// Indices of the windows, among those of all logs, in which `pushes` act.
+    /// Indices of the windows, among those of the training logs and then of the holdout, in which `pushes` act.
     fn touched(&self, pushes: &[Disturbance]) -> Vec<usize> {
-        let data = self.training.data.clone().and(self.holdout.data.clone());
-        let logs = self.training.data.tracks.len();
-        let acts = |window: &Window<N>, push: &Disturbance| {
-            let (t, [_, time, duration]) = (&data.tracks[window.track].t, push.push.p);
-            window.track == push.track + if push.holdout { logs } else { 0 }
+        let acts = |set: usize, window: &Window<N>, push: &Disturbance| {
+            let (t, [_, time, duration]) = (&self.track((set, window.track)).t, push.push.p);
+            push.place() == (set, window.track)
                 && t[window.first] < time + 0.5 * duration
                 && t[window.last] > time - 0.5 * duration
         };
-        let windows = data.windows.iter().enumerate();
-        windows.filter(|(_, w)| pushes.iter().any(|push| acts(w, push))).map(|(i, _)| i).collect()
+        let of = |(set, sample): (usize, &WindowSet<N>)| -> Vec<bool> {
+            let touches = |w: &Window<N>| pushes.iter().any(|push| acts(set, w, push));
+            sample.data.windows.iter().map(touches).collect()
+        };
+        let touched = [&self.training, &self.holdout].into_iter().enumerate().flat_map(of);
+        touched.enumerate().filter_map(|(i, touched)| touched.then_some(i)).collect()
     }
 
     /// The model refitted to the training windows, and its cost; initial states and weights are recomputed `rounds` times, at the scales and the

@@ -52,18 +52,11 @@ fn nearby<const N: usize>(
     found.filter(|(_, reached)| *reached < least).unwrap_or(best)
 }
 
-/// Widths of least cost: the best of `tried`, in order, on all joints, then a common width near it, then one for each joint; none is less than the
-/// joint's `narrowest`.
+/// Widths of least cost: the best of `tried` on all joints, then a common width near it, then one for each joint.
 fn least_widths<const N: usize>(
     cost: impl Fn([f64; N]) -> f64,
     tried: impl IntoIterator<Item = f64>,
-    narrowest: [f64; N],
 ) -> Option<Widths<N>> {
-    let within = |widths: [f64; N]| std::array::from_fn(|j| widths[j].max(narrowest[j]));
-    let cost = |widths: [f64; N]| cost(within(widths));
-    let least = narrowest.into_iter().fold(f64::INFINITY, f64::min);
-    let mut tried: Vec<f64> = tried.into_iter().map(|width| width.max(least)).collect();
-    tried.dedup();
     let mut best = tried
         .into_iter()
         .map(|width| ([width; N], cost([width; N])))
@@ -75,21 +68,27 @@ fn least_widths<const N: usize>(
             best = nearby(&cost, best, joint..joint + 1, (REACH[1], EVALUATIONS[1]));
         }
     }
-    Some((within(best.0), best.1))
+    Some(best)
 }
 
-/// Widths of least cost near the widths `from`, joint by joint; none is less than the joint's `narrowest`.
-fn refined_widths<const N: usize>(
-    cost: impl Fn([f64; N]) -> f64,
-    from: [f64; N],
-    narrowest: [f64; N],
-) -> Widths<N> {
-    let within = |widths: [f64; N]| std::array::from_fn(|j| widths[j].max(narrowest[j]));
-    let cost = |widths: [f64; N]| cost(within(widths));
-    let best = (0..N)
+/// Widths of least cost near the widths `from`, joint by joint; a joint of exact friction, whose width is zero, keeps it.
+fn refined_widths<const N: usize>(cost: impl Fn([f64; N]) -> f64, from: [f64; N]) -> Widths<N> {
+    (0..N)
         .filter(|j| from[*j] > 0.0)
-        .fold((from, cost(from)), |best, joint| nearby(&cost, best, joint..joint + 1, REFINED));
-    (within(best.0), best.1)
+        .fold((from, cost(from)), |best, joint| nearby(&cost, best, joint..joint + 1, REFINED))
+}
+
+/// Widths, none less than the joint's `narrowest` but the zero widths of exact friction.
+fn no_narrower<const N: usize>(widths: [f64; N], narrowest: [f64; N]) -> [f64; N] {
+    std::array::from_fn(|j| if widths[j] > 0.0 { widths[j].max(narrowest[j]) } else { 0.0 })
+}
+
+/// Widths in increasing order of which at most one is no wider than every joint's `narrowest`, and would stand for the narrower ones.
+fn distinct<const N: usize>(tried: [f64; WIDTHS.len()], narrowest: [f64; N]) -> Vec<f64> {
+    let least = narrowest.into_iter().fold(f64::INFINITY, f64::min);
+    let mut distinct: Vec<f64> = tried.into_iter().map(|width| width.max(least)).collect();
+    distinct.dedup();
+    distinct
 }
 
 /// Narrowest widths of friction regularisation by joint, rad/s or m/s, with which the steps of predictions are stable at the start of every window.
@@ -108,17 +107,19 @@ fn narrowest_widths<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     Some(narrowest)
 }
 
-/// The model with its widths of friction regularisation refined; none where this does no better.
-fn with_refined_widths<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+/// The model with the widths of friction regularisation that `search` finds, given their cost and the narrowest ones; none where its own widths cost no
+/// more. Costs are those after the values are estimated again to first order, from the model's `jacobian`.
+fn with_widths<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     problem: &FitProblem<A, N, P>,
     model: &Hypothesis<P>,
     jacobian: &[Vec<f64>],
+    search: impl Fn(&dyn Fn([f64; N]) -> f64, [f64; N]) -> Option<Widths<N>>,
 ) -> Option<Hypothesis<P>> {
     let narrowest = narrowest_widths(problem, model)?;
-    let cost = |widths: [f64; N]| problem.cost_refitted(&model.rounded_over(widths), jacobian);
-    let own = std::array::from_fn(|j| model.rounding[j]);
-    let (widths, least) = refined_widths(cost, own, narrowest);
-    (least < cost(own)).then(|| model.rounded_over(widths))
+    let rounded = |widths: [f64; N]| model.rounded_over(no_narrower(widths, narrowest));
+    let cost = |widths: [f64; N]| problem.cost_refitted(&rounded(widths), jacobian);
+    let (widths, least) = search(&cost, narrowest)?;
+    (least < problem.cost_refitted(model, jacobian)).then(|| rounded(widths))
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
@@ -130,12 +131,10 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         model: &Hypothesis<P>,
         jacobian: &[Vec<f64>],
     ) -> Option<Hypothesis<P>> {
-        let narrowest = narrowest_widths(problem, model)?;
-        let cost = |widths: [f64; N]| problem.cost_refitted(&model.rounded_over(widths), jacobian);
-        let now = problem.cost_refitted(model, jacobian);
-        let slowest = self.scales.slowest();
-        let (widths, least) = least_widths(cost, WIDTHS.map(|part| part * slowest), narrowest)?;
-        (least < now).then(|| model.rounded_over(widths))
+        let tried = WIDTHS.map(|part| part * self.scales.slowest());
+        let search =
+            |cost: &dyn Fn([f64; N]) -> f64, narrowest| least_widths(cost, distinct(tried, narrowest));
+        with_widths(problem, model, jacobian, search)
     }
 
     /// Alternatives to a model: with the widths of friction regularisation that suit it best, and with dry friction if the model's friction is
@@ -188,9 +187,9 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let cost = |of: &Candidate<P>| of.fit.data_cost + of.fit.prior_cost;
         for _ in 0..ROUNDS {
             let model = &best.fit.hypothesis;
-            let Some(refined) = with_refined_widths(&problem, model, &problem.jacobian(model)) else {
-                break;
-            };
+            let own = std::array::from_fn(|j| model.rounding[j]);
+            let near = |cost: &dyn Fn([f64; N]) -> f64, _| Some(refined_widths(cost, own));
+            let Some(refined) = with_widths(&problem, model, &problem.jacobian(model), near) else { break };
             let found = self.candidate(&node.weights, &refined, model.effects.len(), Effort::FULL, &[]);
             if cost(&found) >= cost(&best) {
                 break;
@@ -212,14 +211,14 @@ mod tests {
 
     #[test]
     fn a_common_width_is_found_between_those_tried() {
-        let (widths, cost) = least_widths(apart([0.005]), WIDTHS, [0.0]).expect("finite costs");
+        let (widths, cost) = least_widths(apart([0.005]), WIDTHS).expect("finite costs");
         assert!((widths[0] / 0.005).ln().abs() < 0.05 && cost < 0.0025, "{widths:?}");
     }
 
     #[test]
     fn every_joint_has_a_width_of_its_own() {
         for best in [[0.002, 0.03], [0.05, 0.004], [0.01, 0.01]] {
-            let (widths, _) = least_widths(apart(best), WIDTHS, [0.0; 2]).expect("finite costs");
+            let (widths, _) = least_widths(apart(best), WIDTHS).expect("finite costs");
             for (found, wanted) in widths.iter().zip(best) {
                 assert!((found / wanted).ln().abs() < 0.2, "{widths:?} for {best:?}");
             }
@@ -229,31 +228,28 @@ mod tests {
     #[test]
     fn widths_that_cannot_be_simulated_are_passed_over() {
         let cost = |widths: [f64; 2]| if widths[0] < 0.01 { f64::NAN } else { widths[0] + widths[1] };
-        let (widths, cost) = least_widths(cost, WIDTHS, [0.0; 2]).expect("some are finite");
+        let (widths, cost) = least_widths(cost, WIDTHS).expect("some are finite");
         assert!(widths[0] >= 0.01 && cost.is_finite());
-        assert!(least_widths(|_: [f64; 2]| f64::INFINITY, WIDTHS, [0.0; 2]).is_none());
+        assert!(least_widths(|_: [f64; 2]| f64::INFINITY, WIDTHS).is_none());
     }
 
     #[test]
     fn widths_near_the_best_are_refined() {
-        let (widths, cost) = refined_widths(apart([0.0076, 0.02]), [0.0084, 0.018], [0.0; 2]);
+        let (widths, cost) = refined_widths(apart([0.0076, 0.02]), [0.0084, 0.018]);
         for (found, wanted) in widths.iter().zip([0.0076_f64, 0.02]) {
             assert!((found / wanted).ln().abs() < 0.02, "{widths:?}");
         }
         assert!(cost < 1e-3);
-        let (widths, _) = refined_widths(apart([0.0076, 0.02]), [0.0084, 0.018], [0.008, 0.0]);
-        assert_eq!(widths[0], 0.008);
+        let (widths, _) = refined_widths(|widths| apart([0.0076])([widths[0]]), [0.0084, 0.0]);
+        assert_eq!(widths[1], 0.0, "exact friction stays exact");
     }
 
     #[test]
     fn no_width_is_narrower_than_can_be_simulated() {
-        let asked = std::cell::RefCell::new(Vec::new());
-        let cost = |widths: [f64; 2]| {
-            asked.borrow_mut().push(widths);
-            apart([0.002, 0.03])(widths)
-        };
-        let (widths, _) = least_widths(cost, WIDTHS, [0.004, 0.01]).expect("finite costs");
-        assert!(widths[0] == 0.004 && widths[1] > 0.01, "{widths:?}");
-        assert!(asked.borrow().iter().all(|w| w[0] >= 0.004 && w[1] >= 0.01));
+        let narrowest = [0.004, 0.01];
+        assert_eq!(no_narrower([0.001, 0.02], narrowest), [0.004, 0.02]);
+        assert_eq!(no_narrower([0.0, 0.002], narrowest), [0.0, 0.01]);
+        assert_eq!(distinct(WIDTHS, narrowest), [0.004, 0.01, 0.03, 0.1, 0.3, 1.0]);
+        assert_eq!(distinct(WIDTHS, [0.0; 2]), WIDTHS);
     }
 }
