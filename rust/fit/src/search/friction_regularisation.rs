@@ -116,10 +116,10 @@ fn with_widths<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     search: impl Fn(&dyn Fn([f64; N]) -> f64, [f64; N]) -> Option<Widths<N>>,
 ) -> Option<Hypothesis<P>> {
     let narrowest = narrowest_widths(problem, model)?;
-    let rounded = |widths: [f64; N]| model.rounded_over(no_narrower(widths, narrowest));
-    let cost = |widths: [f64; N]| problem.cost_refitted(&rounded(widths), jacobian);
+    let regularised = |widths: [f64; N]| model.rounded_over(no_narrower(widths, narrowest));
+    let cost = |widths: [f64; N]| problem.cost_refitted(&regularised(widths), jacobian);
     let (widths, least) = search(&cost, narrowest)?;
-    (least < problem.cost_refitted(model, jacobian)).then(|| rounded(widths))
+    (least < problem.cost_refitted(model, jacobian)).then(|| regularised(widths))
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
