@@ -64,3 +64,23 @@ def test_a_drive_that_slews_far_behind_its_command_has_no_other_columns(arm: Arm
     assert not any(c.severity in ("error", "repaired") for c in checked(logs, arm))
     exchanged = [replace(log, tau=-log.tau[::-1].copy()) for log in logs]
     assert any(c.check == "joint_order" for c in checked(exchanged, arm)), "torques of another run belong to no arm"
+
+
+def test_noise_above_a_limited_torque_is_no_sign_of_other_columns(arm: Arm) -> None:
+    logs = carried(arm, Effect("torque_saturation", 2, {"level": 0.6}), scale=3.0)
+    drawn = np.random.default_rng(1)
+    noisy = [replace(log, q=log.q + drawn.normal(0.0, 4e-3, log.q.shape)) for log in logs]
+    base = EquationError([Rows.of(log, arm) for log in noisy], arm)
+    noise = base.noise_square(noisy)
+    assert noise[1] > 0.3 * 0.6**2, "noise hides what the torque does"
+    assert not any(c.severity == "error" for c in checked(noisy, arm))
+
+
+def test_the_torque_that_noise_leaves_is_that_of_the_noise(arm: Arm) -> None:
+    [log, _] = carried(arm, scale=3.0)
+    drawn = np.random.default_rng(2).normal(0.0, 1e-3, log.q.shape)
+    noisy = replace(log, q=log.q + drawn)
+    rows = [Rows.of(x, arm) for x in (log, noisy)]
+    left = np.mean(((rows[1].psi - rows[0].psi) @ arm.theta) ** 2, axis=0)
+    found = EquationError(rows[1:], arm).noise_square([noisy])
+    np.testing.assert_allclose(found, left, rtol=0.3)

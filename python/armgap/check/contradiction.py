@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -119,6 +119,10 @@ class Refit:
         errors = np.maximum(self.error, least) / np.maximum(other.error, least)
         return float(np.exp(np.mean(np.log(errors))))
 
+    def bounded_by_motion(self) -> Refit:
+        """Return the refit with errors of at most the RMS displacement within a window: the error of predicting no motion."""
+        return replace(self, error=np.minimum(self.error, self.motion))
+
     @property
     def relative(self) -> float:
         """RMS error as a part of the RMS displacement within a window, the geometric mean over the joints."""
@@ -209,6 +213,8 @@ def confirm(
         return None
     as_is = Refit.of(arm, training, holdout, horizon)
     possible = as_is.possible(arm)
+    # Of an arm that hardly moves the log as it stands may be missed by many times the motion; that confirms no other reading.
+    no_worse_than_rest = as_is.bounded_by_motion()
     tried = []
     for suspect in suspects[:_MOST_SUSPECTS]:
         corrections = suspect.reading.corrections
@@ -216,7 +222,7 @@ def confirm(
         refit = Refit.of(corrections.on_arm(arm), read[0], read[1], horizon)
         explains = refit.relative < EXPLAINS or (refit.relative < 1.0 and suspect.fit.share.max() < _ACCOUNTS_FOR)
         if refit.possible(corrections.on_arm(arm)) and explains:
-            ratio = refit.against(as_is, rescaled=bool(corrections.unit))
+            ratio = refit.against(no_worse_than_rest, rescaled=bool(corrections.unit))
             says = suspect.gain - math.log(ratio)
             if (ratio <= BETTER and says >= _SAYS) if possible else ratio <= AS_GOOD:
                 tried.append((ratio, suspect, refit))

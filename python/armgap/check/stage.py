@@ -147,10 +147,11 @@ def unexplained_columns(
     """
     if relative < _UNPREDICTED[1]:
         return []
-    base = EquationError([Rows.of(log, arm) for log in (*training, *holdout)], arm)
+    logs = [*training, *holdout]
+    base = EquationError([Rows.of(log, arm) for log in logs], arm)
     if len(base) < _FEWEST_ROWS:
         return []
-    elastic = base.of_torques(_beside_elasticity(base, [*training, *holdout], arm))
+    elastic = base.of_torques(_beside_elasticity(base, logs, arm))
     share = np.where(base.square >= _DRIVEN * base.scale, elastic.share, 0.0)
     return _strangers(share, Examined(list(training), list(holdout), arm, (), Corrections()), horizon, 1)
 
@@ -159,11 +160,16 @@ def _strangers(share: Array, now: Examined, horizon: float, pair: int) -> list[C
     """Return a check that torques and positions do not belong together, by pair `pair` of the thresholds `_UNRELATED`.
 
     The check is returned where parameters with the arm file's signs leave a part of a torque unexplained (`share` per joint), even beside
-    springs and contacts or behind a drive that saturates far below its command, and do not predict the motion even with shifted torques.
+    springs and contacts or behind a drive that saturates far below its command, and do not predict the motion even with shifted torques. What
+    noise of the positions leaves of a torque is not counted.
     """
     worst = int(np.argmax(share))
     logs = [*now.training, *now.holdout]
-    if share[worst] < _UNRELATED[pair] or torque_unit.limited(logs, now.arm, worst).share.max() < torque_unit.LIMITED:
+    if share[worst] < _UNRELATED[pair]:
+        return []
+    noise = EquationError([Rows.of(log, now.arm) for log in logs], now.arm).noise_square(logs)
+    limited, fit = torque_unit.limited(logs, now.arm, worst)
+    if (fit.share - noise / np.maximum(limited.square, np.finfo(float).tiny)).max() < torque_unit.LIMITED:
         return []
     period = float(np.median(np.diff(logs[0].t)))
     readings = [Corrections(), *(Corrections(shift={"tau": k * period}) for k in _SHIFTS)]

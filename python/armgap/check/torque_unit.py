@@ -53,6 +53,8 @@ _LEFT = 0.3
 # whose torques were in newton metres.
 _CHANGE_TRIED = 0.1
 _CHANGE_TAKEN = 0.5
+# Standard deviations of the arm file beyond which friction is not that of the arm file.
+_SURE = 3.0
 # Share of unexplained torque below which a factor is exact: remaining errors are those of the arm file's parameters.
 _LEAST_SHARE = 1e-3
 # Quantiles of a torque's size at which a drive's limit is tried: a limit between two quantiles still explains what no factor does.
@@ -105,13 +107,25 @@ def find(base: EquationError, logs: Sequence[Log], arm: Arm) -> Factors | None:
     fit = base.with_factors(low, high, applied)
     gain = base.with_factors(low, high, np.ones_like(applied)).cost - fit.cost
     scaled = shared and _within(applied[0], _SCALED)
-    if gain < (0.0 if scaled else _GAIN_IN_COST):
+    if gain < (0.0 if scaled else _GAIN_IN_COST) or (scaled and _friction_stands(base, arm, applied[0])):
         return None
-    if min(limited(logs, arm, j).closeness for j in odd) < fit.closeness:
+    if min(limited(logs, arm, j)[1].closeness for j in odd) < fit.closeness:
         return None
     corrections, checks = _said(applied, odd, shared)
     doubtful = float(fit.share.max()) > _CHANGE_TRIED or gain < _CLEAR_GAIN
     return Factors(corrections, fit.closeness, tuple(checks), doubtful)
+
+
+def _friction_stands(base: EquationError, arm: Arm, factor: float) -> bool:
+    """Return whether friction is that of the arm file in the torques as logged and is not in the scaled ones.
+
+    A payload scales inertias and weights, another unit of the torques friction too.
+    """
+    b = arm.n_inertial
+    friction = base.fit(*bounds(arm)).theta[b:]
+    sigma = np.maximum(arm.sigma[b:], np.finfo(float).tiny)
+    logged, scaled = (np.abs((x - arm.theta[b:]) / sigma) for x in (friction, factor * friction))
+    return bool(logged.max() <= _SURE and np.sum(scaled**2) - np.sum(logged**2) > _SURE**2)
 
 
 def _common(factors: NDArray[np.float64], share: NDArray[np.float64]) -> float:
@@ -120,14 +134,14 @@ def _common(factors: NDArray[np.float64], share: NDArray[np.float64]) -> float:
     return math.exp(float(np.average(np.log(factors), weights=weight)))
 
 
-def limited(logs: Sequence[Log], arm: Arm, joint: int) -> Fit:
-    """Return the best fit with the torques of one joint limited in size or in rate.
+def limited(logs: Sequence[Log], arm: Arm, joint: int) -> tuple[EquationError, Fit]:
+    """Return the equation error and the best fit with the torques of one joint limited in size or in rate.
 
     A limit in size far below the command looks like a small factor, a limit in rate like columns of another arm.
     """
     low, high = bounds(arm, _TRUST)
-    fits = (errors.of_torques(errors.fit(low, high)) for _, errors in _at_limits(logs, arm, joint))
-    return min(fits, key=lambda fit: fit.closeness)
+    fits = ((errors, errors.of_torques(errors.fit(low, high))) for _, errors in _at_limits(logs, arm, joint))
+    return min(fits, key=lambda entry: entry[1].closeness)
 
 
 @dataclass(frozen=True)

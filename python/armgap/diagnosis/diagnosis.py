@@ -18,7 +18,7 @@ from armgap.arm.corrections import Corrections
 from armgap.check import torque_unit
 from armgap.check.check import Check
 from armgap.check.stage import unexplained_columns
-from armgap.check.time_shift import causal, early, taken_back
+from armgap.check.time_shift import causal, early, explains_better, taken_back
 from armgap.diagnosis.custom_effect import CustomEffect, TorqueTables, check_effects
 from armgap.diagnosis.drive_chain import drive_chain
 from armgap.diagnosis.prepared_input import PreparedInput, prepare, refused
@@ -149,21 +149,16 @@ def _diagnose(given: PreparedInput, settings: dict[str, Any], effects: Sequence[
     if arm.chain is not None:
         changed, notes = serial_settings(given.checks)
         settings, given = settings | changed, replace(given, notes=(*given.notes, *notes))
-    try:
-        text = _native.diagnose(
-            arm.to_native(),
-            [log.to_native(tables.by_log[log.name]) for log in training],
-            [log.to_native(tables.by_log[log.name]) for log in held],
-            settings,
-            report_progress,
-        )
-    except ValueError as error:
-        raise refused(str(error), training, held) from None
-    data = tables.named(json.loads(text))
+    data = tables.named(_attributed(given, settings, tables))
     if factors := torque_unit.refined(given.factors, data["causes"], arm.n_joints):
         return _diagnose(replace(given.with_factors(factors), factors={}), settings, effects)
     if taken_back(data["causes"], arm.n_joints, given.shift):
         return _diagnose(given.without_shift(), settings, effects)
+    if given.shift < 0.0 and not contradictory and data["verdict"] == "unexplained":
+        unshifted = given.without_shift()
+        other = _attributed(unshifted, settings, TorqueTables.of(effects, unshifted.training, unshifted.holdout))
+        if explains_better(other["gap"], data["gap"]):
+            return _diagnose(unshifted, settings, effects)
     if not contradictory and (columns := _columns(data, given)):
         return _diagnose(replace(given, checks=(*columns, *given.checks)), settings, effects)
     if contradictory:
@@ -196,6 +191,23 @@ def _diagnose(given: PreparedInput, settings: dict[str, Any], effects: Sequence[
     ]
     data["log_findings"] = remarks
     return Diagnosis.from_dict(data)
+
+
+def _attributed(given: PreparedInput, settings: dict[str, Any], tables: TorqueTables) -> dict[str, Any]:
+    """Return the result of the compiled core on prepared input, as a dict; custom effects have numbers for names."""
+    training, held = given.training, given.holdout
+    try:
+        text = _native.diagnose(
+            given.arm.to_native(),
+            [log.to_native(tables.by_log[log.name]) for log in training],
+            [log.to_native(tables.by_log[log.name]) for log in held],
+            settings,
+            report_progress,
+        )
+    except ValueError as error:
+        raise refused(str(error), training, held) from None
+    found: dict[str, Any] = json.loads(text)
+    return found
 
 
 def _input(arm: Arm, training: list[Log], held: list[Log]) -> InputSummary:

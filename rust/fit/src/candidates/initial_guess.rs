@@ -24,9 +24,9 @@ const IMITATED: f64 = 1e-4;
 /// Least part of the training cost that a candidate must remove to first order to be fitted.
 const TRACE: f64 = 0.01;
 
-/// Least part of the training cost that a candidate must remove to first order to be fitted where the gap is of no consequence: only an effect
-/// that explains most of such a gap would be named.
-const TRACE_IN_SMALL: f64 = 0.1;
+/// Least part of the training cost above the noise floor that a candidate must remove to first order to be fitted where the gap is of no consequence:
+/// only an effect that explains most of such a gap would be named.
+const TRACE_IN_SMALL: f64 = 0.2;
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
     /// Hypotheses that are worth a full fit, each the fitted model with one more candidate, and the score tests of all candidates (those not in the
@@ -44,8 +44,11 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         }
         let (all, screened) = self.screened(fit, weights);
         let training: f64 = self.problem(&weights.training).window_costs(&fit.hypothesis).iter().sum();
-        let trace = if size < CONSEQUENTIAL_ERROR { TRACE_IN_SMALL } else { TRACE };
-        let least = if gap { trace * training } else { f64::INFINITY };
+        let least = match size {
+            _ if !gap => f64::INFINITY,
+            _ if size < CONSEQUENTIAL_ERROR => TRACE_IN_SMALL * self.above_floor(training, weights),
+            _ => TRACE * training,
+        };
         let more = promising(&screened, least).into_iter().map(|found| {
             let effect = found.effect;
             self.payload_guess(&fit.hypothesis, effect)
@@ -66,8 +69,13 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let (_, screened) = self.screened(fit, weights);
         let gains = screened.into_iter().map(|test| test.gain);
         let cost: f64 = self.problem(&weights.training).window_costs(&fit.hypothesis).iter().sum();
+        gains.fold(0.0, f64::max) / self.above_floor(cost, weights)
+    }
+
+    /// Cost of the training windows above what noise alone would leave.
+    fn above_floor(&self, cost: f64, weights: &SplitWeighting<N>) -> f64 {
         let rows = self.training.data.rows as f64 / self.holdout.data.rows as f64;
-        gains.fold(0.0, f64::max) / (cost - rows * self.floor(weights)).max(1e-9 * cost)
+        (cost - rows * self.floor(weights)).max(1e-9 * cost)
     }
 
     /// All candidates at their initial guesses, those not in the model first, and the score test of each.

@@ -7,7 +7,7 @@ use crate::likelihood::holdout::CONSEQUENTIAL_ERROR;
 use crate::likelihood::holdout::is_plausible;
 use crate::model::hypothesis::EffectInstance;
 use crate::search::attribute::{Candidate, SearchNode};
-use armgap_core::effect::{Quantity, Trial};
+use armgap_core::effect::Quantity;
 
 /// Mean advantage per window, in standard errors, below which a cause is not accepted.
 pub const CERTAIN: f64 = 3.5;
@@ -31,8 +31,9 @@ pub const ABOVE_FLOOR: f64 = 1.25;
 /// Cost of a typical window, relative to what noise alone leaves, up to which a gap is due to a few outlying windows.
 const AT_FLOOR: f64 = 1.5;
 
-/// Least decrease of the cost of outlying windows by a candidate that explains them, in costs of a typical window.
-const OUTLYING: f64 = 25.0;
+/// Least decrease of the cost of outlying windows by a candidate that explains them: in standard deviations of a typical window's cost where that is
+/// noise, in costs of a typical window elsewhere.
+const OUTLYING: f64 = 30.0;
 
 /// Largest increase of the cost of all other windows by a candidate that explains outlying windows, as a part of the decrease of their cost.
 const HARMLESS: f64 = 0.05;
@@ -112,8 +113,7 @@ impl<const N: usize, const P: usize> SearchNode<N, P> {
     /// effect needs none where all other windows are at the noise floor: the noise is known there, and the errors that the effect explains are not
     /// noise.
     fn settles_outliers(&self, candidate: &Candidate<P>) -> bool {
-        let windows = self.base.holdout.len() as f64;
-        self.weights.holdout.typical < AT_FLOOR * self.floor / windows
+        self.is_typically_noise()
             && self.share(candidate) > MOST
             && self.settles(&candidate.training, &self.base.training)
             && self.settles(&candidate.holdout, &self.base.holdout)
@@ -125,11 +125,13 @@ impl<const N: usize, const P: usize> SearchNode<N, P> {
         self.settles(&fit.training, &other.training) || self.settles(&fit.holdout, &other.holdout)
     }
 
+    /// Whether a typical window's cost is what noise alone leaves.
+    fn is_typically_noise(&self) -> bool {
+        self.weights.holdout.typical < AT_FLOOR * self.floor / self.base.holdout.len() as f64
+    }
+
     fn settles(&self, mine: &[f64], base: &[f64]) -> bool {
-        let gains = || base.iter().zip(mine).map(|(b, m)| b - m);
-        let gain: f64 = gains().filter(|g| *g > 0.0).sum();
-        let loss: f64 = gains().filter(|g| *g < 0.0).sum();
-        gain > OUTLYING * self.weights.holdout.typical && -loss < HARMLESS * gain
+        settles(mine, base, outlying(self.weights.holdout.typical, self.is_typically_noise()))
     }
 
     /// Factor by which the gap that is left widens the prior variance of the parameters; 1 where the gap is explained.
@@ -142,10 +144,23 @@ impl<const N: usize, const P: usize> SearchNode<N, P> {
     pub fn shows(&self, effect: Option<&EffectInstance>) -> bool {
         self.relative_error() > RELEVANT
             || effect.is_some_and(|e| {
-                let spec = e.law.spec();
-                spec.trial != Trial::Whole && spec.parameters[0].quantity != Quantity::Time
+                !matches!(e.law.spec().parameters[0].quantity, Quantity::Time | Quantity::ShaftStiffness)
             })
     }
+}
+
+/// Whether the window costs `mine` are lower than `base` by more than `least` in some windows and hardly higher in any.
+fn settles(mine: &[f64], base: &[f64], least: f64) -> bool {
+    let gains = || base.iter().zip(mine).map(|(b, m)| b - m);
+    let gain: f64 = gains().filter(|g| *g > 0.0).sum();
+    let loss: f64 = gains().filter(|g| *g < 0.0).sum();
+    gain > least && -loss < HARMLESS * gain
+}
+
+/// Least decrease of the cost of outlying windows beside windows of the cost `typical`. The cost of noise is a sum of squares, whose variance is twice
+/// its mean; what a model lacks scatters by as much as it costs.
+fn outlying(typical: f64, is_noise: bool) -> f64 {
+    OUTLYING * if is_noise { (2.0 * typical).sqrt() } else { typical }
 }
 
 /// Ground on which a candidate is accepted as a cause.
@@ -318,6 +333,23 @@ mod tests {
     fn the_better_of_two_with_as_many_values_stays() {
         assert_eq!(fewest_values(&[offer(100.0, 1), offer(99.0, 1)], 0, ALMOST), 0);
         assert_eq!(fewest_values(&[offer(100.0, 3), offer(99.0, 2), offer(98.0, 2)], 0, ALMOST), 1);
+    }
+
+    #[test]
+    fn few_windows_far_out_of_the_noise_are_evidence_enough() {
+        let (mut base, mut mine) = ([500.0; 40], [499.0; 40]);
+        base[7..12].copy_from_slice(&[800.0; 5]);
+        mine[30] = 505.0;
+        assert!(
+            settles(&mine, &base, outlying(500.0, true)),
+            "five windows, each ten standard deviations of noise"
+        );
+        assert!(
+            !settles(&mine, &base, outlying(500.0, false)),
+            "beside windows that the model misses as well"
+        );
+        mine[30] = 650.0;
+        assert!(!settles(&mine, &base, outlying(500.0, true)), "another window gets worse");
     }
 
     #[test]
