@@ -13,13 +13,14 @@ const MAX_REFINEMENTS: usize = 4;
 /// Largest number of false-position steps to the instant at which a stuck joint breaks away or a backlash opens.
 const MAX_FALSE_POSITIONS: usize = 12;
 
-/// Positive stiction violation, or flank tension, as a part of the violation's change over a step, below which the root is near enough.
+/// Positive stiction violation, or flank tension, as a part of its change over a step, below which the instant of breakaway, or of opening, is
+/// located well enough.
 const RELEASED: f64 = 1e-8;
 
 /// Distance by which a joint that has crossed a position at which its torque jumps is put beyond the position, rad or m.
 const BESIDE: f64 = 1e-13;
 
-/// Part of a step by which false-position steps go beyond the expected root, so that they end on its far side.
+/// Part of a step by which false-position steps go beyond the expected root, so that they end where the violation is positive.
 const BEYOND: f64 = 1e-9;
 
 impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A, N, P> {
@@ -93,7 +94,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A,
     #[inline(never)]
     pub(super) fn locate(&self, trial_step: &TrialStep<'_, T, N>, event: &ModeEvent<T>) -> Located<T, N> {
         if event.joint >= N {
-            // No event has such a joint; said here so that no index below needs a panic.
+            // Never true; the test lets the compiler omit bounds checks, and panics, for the indices below.
             return Located { length: trial_step.dt, reached: *trial_step.state };
         }
         match event.change {
@@ -154,8 +155,8 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A,
         state.modes[j] = Mode::Stuck;
     }
 
-    /// Integrates to where the velocity of an event's joint vanishes, by Newton's method until the last correction is so small that linear
-    /// interpolation suffices.
+    /// Integrates to where the velocity of an event's joint, or of the motor that carries its friction, vanishes, by Newton's method until the last
+    /// correction is so small that linear interpolation suffices.
     fn locate_standstill(&self, trial_step: &TrialStep<'_, T, N>, event: &ModeEvent<T>) -> Located<T, N> {
         let &TrialStep { state, x, dt, k1 } = trial_step;
         let mut s = event.s;
@@ -191,7 +192,8 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A,
         Located { length: s * dt, reached }
     }
 
-    /// Integrates to where a distance, as from a joint limit, vanishes, by Newton's method; `beyond` gives the distance, rad or m, and its rate.
+    /// Integrates to where a joint position, or a deflection within its backlash, reaches a limit, by Newton's method; `beyond` gives its distance
+    /// beyond the limit, rad or m, and the rate of the distance.
     pub(super) fn locate_crossing(
         &self,
         &TrialStep { state, x, dt, k1 }: &TrialStep<'_, T, N>,

@@ -1,7 +1,7 @@
 //! Division of a sample interval into equal steps that keep Runge-Kutta stable.
 //!
 //! Regularised friction is stiff where a joint is near standstill, and constant where it slides. While all joints slide, steps are as long as the
-//! rest of the plant allows; from a step at whose end one no longer does, the interval is divided again.
+//! rest of the plant allows; from a step at whose end a joint no longer slides, the interval is divided again.
 
 use super::{Interval, State, fixed_mode_step, substep};
 use crate::arm::Arm;
@@ -18,14 +18,14 @@ const RESOLVED: f64 = 0.35;
 /// Largest numbers of steps in one sample interval.
 #[derive(Debug, Clone, Copy)]
 pub struct StepLimits {
-    /// Largest number of steps that the rate of regularised friction may ask for, where a joint is near standstill.
+    /// Largest number of steps for the rate of regularised friction, where a joint is near standstill.
     pub near_standstill: usize,
-    /// Largest number of steps that motors oscillating against their links and impacts on joint limits may ask for.
+    /// Largest number of steps for motors that oscillate against their links and for impacts on joint limits.
     pub elsewhere: usize,
 }
 
-/// Number of steps, at least 1 and at most `most`, that divide a sample interval so that a rate whose product with its length is `needed` has a
-/// product with their length of at most `allowed`.
+/// Smallest number of equal steps of a sample interval, from 1 to `most`, with which the product of a rate and the length of a step is at most
+/// `allowed`, or `most`; `needed` is the product of the rate and the length of the interval.
 fn substeps<T: Real>(needed: T, allowed: f64, most: usize) -> usize {
     (1..most).find(|count| needed <= lit(allowed * *count as f64)).unwrap_or(most.max(1))
 }
@@ -61,7 +61,7 @@ impl<T: Real> Division<T> {
         Self { index: 0, count: 1, near_standstill: 1, h: T::zero() }
     }
 
-    /// Start of the step after its interval's, s.
+    /// Time from the start of the interval to the start of the step, s.
     pub(crate) fn from(&self) -> T {
         self.h * lit(self.index as f64)
     }
@@ -86,7 +86,7 @@ impl<T: Real> Division<T> {
     }
 }
 
-/// Advances `state` over one sample interval in steps that keep Runge-Kutta stable with the plant's rates there.
+/// Advances `state` over one sample interval in equal steps that keep Runge-Kutta stable for the plant's rates `rates`, as far as `limits` allows.
 pub fn advance_in_stable_steps<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize>(
     plant: &Plant<T, A, N, P>,
     state: &mut State<T, N>,

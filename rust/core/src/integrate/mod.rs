@@ -24,8 +24,8 @@ pub(crate) use division::{Division, keep_sliding};
 pub use division::{StepLimits, advance_in_stable_steps, largest_stable_rate};
 use nalgebra::SVector;
 
-/// Largest number of events located within one step, after which crossing joints are stopped and the rest of the step is taken: 8 per joint, at least
-/// 16.
+/// Largest number of events located within one step, after which joints that change the sign of their velocity are stopped and the rest of the step
+/// is taken: 8 per joint, at least 16.
 const fn max_events(joints: usize) -> usize {
     if joints < 2 { 16 } else { 8 * joints }
 }
@@ -183,7 +183,7 @@ impl<'a, T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'a, T
         self.plant.acceleration(self.interval.t + x, &kinematics, &tau, &state.modes, &state.latent)
     }
 
-    /// State after `dt` seconds from `state` at the velocities of `at` and the accelerations `slope`.
+    /// State `dt` seconds after `state`, with the velocities of the state `at` and the accelerations `slope` held constant.
     #[inline]
     fn moved(
         &self,
@@ -235,7 +235,7 @@ impl<'a, T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'a, T
         next
     }
 
-    /// State after a step of `dt` seconds in which the friction of all joints is rounded, so that there are no events.
+    /// State after a step of `dt` seconds in which the friction of all joints is regularised, so that there are no events.
     fn smooth(&self, state: &State<T, N>, x: T, dt: T) -> State<T, N> {
         let k1 = self.motion(x, state);
         self.runge_kutta(state, x, dt, &k1)

@@ -1,9 +1,9 @@
 //! Friction modes of joints at rest: which joints break away at an instant, and in which direction.
 //!
-//! The accelerations `a` of joints at rest minimise `a' M a / 2 - a' r + sum level_j |a_j|`, which is strictly convex (Gauss's principle of
-//! least constraint with dry friction; Moreau 1988), so one set of modes is right. It is found by an active-set method, as for quadratic
-//! programs: the joint with the largest stiction violation is released; on the way to the accelerations of the new modes, the first
-//! joint whose acceleration would change its sign sticks again. Each round lowers the sum, so no set of modes occurs twice.
+//! The accelerations `a` of joints at rest, with `r` the torques on them but for dry friction, minimise `a' M a / 2 - a' r + sum level_j |a_j|`,
+//! which is strictly convex (Gauss's principle of least constraint with dry friction; Moreau 1988), so one set of modes is right. It is found by an
+//! active-set method, as for quadratic programs: the joint with the largest stiction violation is released; on the way to the accelerations of the
+//! new modes, the first joint whose acceleration would change its sign sticks again. Each round lowers the sum, so no set of modes occurs twice.
 
 use super::{State, SubStep};
 use crate::arm::Arm;
@@ -32,8 +32,8 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A,
         motion
     }
 
-    /// Releases joint `j`, sticks joints that are then pulled back, and returns the accelerations; `in_vain` marks joints that are pulled back as
-    /// they are released.
+    /// Releases joint `j` into the friction mode `mode`, sticks joints that are then pulled back, and returns the accelerations; `in_vain` marks
+    /// joints that are pulled back as they are released.
     #[inline(never)]
     fn released(
         &self,
@@ -45,7 +45,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A,
     ) -> Accelerations<T, N> {
         let mut from = self.friction_accelerations(state, motion);
         if j >= N {
-            // No joint is; said here so that no index below needs a panic.
+            // Never true; the test lets the compiler omit bounds checks, and panics, for the indices below.
             return *motion;
         }
         state.modes[j] = mode;
@@ -141,8 +141,8 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A,
         found
     }
 
-    /// Stiction violation of joint `j`, N m (N) (friction torque at rest less the Coulomb level), and the direction, -1 or 1, in which it would
-    /// slide.
+    /// Stiction violation of joint `j` at `x` seconds after the sample, N m (N) (friction torque at rest less the Coulomb level), and the direction,
+    /// -1 or 1, in which the joint would slide.
     #[inline]
     pub(super) fn stiction_violation(
         &self,

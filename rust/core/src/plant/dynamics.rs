@@ -24,7 +24,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Dynamics<T, N> fo
         let KinematicState { joints: JointState { q, dq }, equation_terms, .. } = at.kinematics;
         let mut generalized_force = *at.tau;
         for j in 0..N {
-            // What is known first is subtracted first: the bias is not.
+            // Terms are subtracted in the order in which they are computed, the bias last.
             generalized_force[j] -= self.rigid.viscous[j] * dq[j];
             let hooks = self.hooks[j];
             if !(hooks.coulomb || hooks.force) {

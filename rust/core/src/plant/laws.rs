@@ -6,14 +6,14 @@ use crate::effect::JointPoint;
 use crate::real::Real;
 
 impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P> {
-    /// State, torque and load of joint `j` at an instant, as effects' laws take them.
+    /// State, torque `tau` and load `load`, N m (N), of joint `j` at an instant, as arguments of the effects' laws.
     #[inline]
     pub(crate) fn point(&self, j: usize, t: T, q: T, dq: T, tau: T, load: T) -> JointPoint<T> {
         let friction = self.rigid.viscous[j] * dq.abs() + self.rigid.coulomb[j];
         JointPoint { t, q, dq, tau, load, friction, other: T::zero(), memory: T::zero() }
     }
 
-    /// Direction in which joint `j` slides: -1, 0 or 1, between them where friction is smoothed.
+    /// Direction in which joint `j` slides: -1, 0 or 1; a number between -1 and 1 where friction is regularised.
     #[inline]
     pub(super) fn sliding(&self, j: usize, dq: &[T; N], modes: &[Mode; N]) -> T {
         if self.is_rounded(j) { (dq[j] / self.rounding[j]).tanh() } else { modes[j].direction() }

@@ -178,7 +178,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         self.has_hysteresis
     }
 
-    /// Hysteresis states of the joints, N m (N), when they have moved to `q` from the positions of `latent`.
+    /// Hysteresis states of the joints, N m (N), after they have moved to the positions `q` from the positions `latent.anchor`.
     #[inline]
     pub fn memory(&self, q: &SVector<T, N>, latent: &LatentState<T, N>) -> SVector<T, N> {
         let mut memory = latent.memory;
@@ -203,7 +203,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         &self.rigid.theta
     }
 
-    /// Whether nothing but friction modes can change during a step: exact friction, no latent states, and no torque that jumps at a
+    /// Whether nothing but friction modes can change during a step of this plant: exact friction, no latent states, and no torque that jumps at a
     /// position.
     #[inline]
     pub fn only_modes_change(&self) -> bool {
@@ -312,7 +312,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         motion
     }
 
-    /// Friction torques on motors that move against their links, N m (N); a stuck motor has the torque that it would otherwise pass on.
+    /// Friction torques on motors that move against their links, N m (N); on a stuck motor, the motor torque less the torque transmitted to the link.
     #[inline]
     fn motor_friction(
         &self,
@@ -341,13 +341,14 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         braked
     }
 
-    /// Velocity, rad/s or m/s, of joint `j`, or of the motor that carries its friction.
+    /// Velocity on which the dry friction of joint `j` acts, rad/s or m/s: that of the joint, or of its motor where friction acts on the motor.
     #[inline]
     pub(crate) fn friction_velocity(&self, j: usize, dq: &SVector<T, N>, latent: &LatentState<T, N>) -> T {
         self.drivetrain.friction_velocity(j, dq[j], latent)
     }
 
-    /// Acceleration, rad/s^2 or m/s^2, of joint `j`, or of the motor that carries its friction.
+    /// Derivative of the velocity on which the dry friction of joint `j` acts, rad/s^2 or m/s^2: of the joint, or of its motor where friction acts
+    /// there.
     #[inline]
     pub(crate) fn friction_acceleration(
         &self,
@@ -388,7 +389,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
                 x.other = self.sliding((j + 1) % N, dq, modes);
                 x.memory = memory[j];
                 rhs[j] = tau[j] - bias[j] + self.force(j, &x);
-                // Nothing holds the link.
+                // Friction acts on the motor, so that no friction holds the link.
                 held[j] = Mode::Forward;
                 continue;
             }
@@ -409,7 +410,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
     }
 
     /// Residual torque by inverse dynamics, N m (N): the torque that the measured motion `[q, dq, ddq]` needs beyond `tau`, with rigid transmissions
-    /// and friction smoothed as set.
+    /// and with friction regularised over the plant's widths.
     pub fn residual_torque(
         &self,
         t: T,
@@ -477,7 +478,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
     #[inline]
     pub fn stiction_violation(&self, j: usize, t: T, q: T, tau: T, friction_at_rest: T) -> (T, T) {
         let direction = if friction_at_rest < T::zero() { -T::one() } else { T::one() };
-        // At rest the load of a joint is what has to be held.
+        // At rest the load of a joint is its friction torque at rest less the motor torque.
         let x = self.point(j, t, q, T::zero(), tau, friction_at_rest - tau);
         (friction_at_rest.abs() - self.level(j, &x, direction), direction)
     }

@@ -9,7 +9,7 @@ use crate::real::{Real, lit};
 use crate::transmission::LatentState;
 use nalgebra::SVector;
 
-/// Factor by which steps during an impact are shorter than stability of the integration needs, to resolve the impact.
+/// Factor by which steps during an impact are shorter than stability of the integration requires, so that the impact is resolved.
 const FOLLOWED: f64 = 4.0;
 
 /// Velocity, in widths of a joint's friction regularisation, beyond which the joint slides: 1 - tanh(6) = 1.2e-5.
@@ -20,12 +20,12 @@ pub(crate) const SLIDING: f64 = 6.0;
 pub struct StepRates<T> {
     /// Rate at which regularised friction stops a joint near standstill.
     pub friction: T,
-    /// Rate at which a motor oscillates against its link, or a joint meets a joint limit, as an impact that is to be resolved.
+    /// Rate at which a motor oscillates against its link, or a joint against a joint limit; the latter with a factor, so that the impact is resolved.
     pub elsewhere: T,
 }
 
 impl<T: Real> StepRates<T> {
-    /// The larger rates of two.
+    /// Rates of which each is the larger of that of `self` and that of `other`.
     #[must_use]
     pub fn max(self, other: Self) -> Self {
         Self { friction: self.friction.max(other.friction), elsewhere: self.elsewhere.max(other.elsewhere) }
@@ -39,7 +39,8 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         self.jumps
     }
 
-    /// Positions of joint `j`, rad (m), at which its torque jumps, each with the contact that is met there, if the jump is due to a joint limit.
+    /// Positions of joint `j`, rad (m), at which its torque jumps, each with the stiffness and damping of the joint limit there, if the jump is due
+    /// to one.
     pub fn edges(&self, j: usize) -> impl Iterator<Item = Edge<T>> {
         let on_joint = self.effects().filter(move |e| e.joint == j);
         on_joint.filter_map(|e| e.law.edge(&e.p))
@@ -115,7 +116,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         self.level(j, &x, T::one()) / (self.rounding[j] * braked)
     }
 
-    /// Width of friction regularisation of each joint, rad/s (m/s), with which friction stops the joint near standstill at the rate `rate`, 1/s, at
+    /// Width of friction regularisation of each joint, rad/s (m/s), for which friction stops the joint near standstill at the rate `rate`, 1/s, at
     /// the positions `q`. Zero for exact friction.
     pub fn widths_at_rate(&self, q: &SVector<T, N>, rate: T) -> [T; N] {
         let inertia = self.rigid.equation_terms(&JointState { q: (*q).into(), dq: [T::zero(); N] }).inertia;
@@ -124,14 +125,14 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         })
     }
 
-    /// Whether the regularised friction of joint `j` differs from Coulomb's at the velocity `dq`, rad/s (m/s), by no more than a part in 10^5; true
-    /// for exact friction.
+    /// Whether the regularised friction of joint `j` differs from Coulomb friction at the velocity `dq`, rad/s (m/s), by no more than a part in 10^5;
+    /// true for exact friction.
     #[inline]
     pub(crate) fn slides(&self, j: usize, dq: T) -> bool {
         dq.abs() > self.rounding[j] * lit(SLIDING) || !self.is_rounded(j)
     }
 
-    /// Whether all joints with regularised friction slide ([`Plant::slides`]).
+    /// Whether all joints with regularised friction slide ([`Plant::slides`]) at the joint velocities `dq`, rad/s or m/s.
     #[inline]
     pub(crate) fn all_slide(&self, dq: &SVector<T, N>, latent: &LatentState<T, N>) -> bool {
         (0..N).all(|j| self.slides(j, self.friction_velocity(j, dq, latent)))

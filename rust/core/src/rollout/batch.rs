@@ -23,7 +23,7 @@ use nalgebra::SVector;
 /// Number of steps of a batch rollout after which sines and cosines that were rotated step by step are computed anew.
 const STEPS_TO_RECOMPUTE: usize = 64;
 
-/// Number subtracted from the mode violation of lanes that have ended, so that it is never positive.
+/// Number subtracted from the mode violation of lanes that have ended, so that these lanes never count as violating a mode.
 const IDLE: f64 = 1e30;
 
 /// Time by which the lanes of a batch rollout advance in one step.
@@ -51,7 +51,7 @@ pub(super) struct LaneBatch<'a, T: Real, C, A, const W: usize, const H: usize, c
     clocks: [Clock<T, N>; WIDTH],
     /// 0 for lanes that move, [`IDLE`] for lanes that have ended, so that ended lanes never show a mode violation.
     idle: [Lanes<T, C, W>; H],
-    /// Index of the run in each lane; `cursors` has the lane's position in the run, `None` if the lane has ended.
+    /// Index of the run in each lane; `cursors` has each lane's position in its run, `None` if the lane has ended.
     runs: [usize; WIDTH],
     cursors: [Option<RunCursor<'a, T, N>>; WIDTH],
     /// Number of lanes that have not ended.

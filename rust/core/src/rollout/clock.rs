@@ -2,7 +2,8 @@
 
 use crate::real::Real;
 
-/// Largest number of mode changes of a lane within one interval, after which the scalar integrator takes the rest of it: 6 per joint, at least 12.
+/// Largest number of mode changes of a lane within one interval, after which the scalar integrator takes the rest of the interval: 6 per joint, at
+/// least 12.
 pub(super) const fn max_changes(joints: usize) -> usize {
     if joints < 2 { 12 } else { 6 * joints }
 }
@@ -16,9 +17,9 @@ pub(super) struct Clock<T, const N: usize> {
     pub(super) left: T,
     /// Reversal at which the next step shall end, if any.
     pub(super) goal: Option<Reversal<T>>,
-    /// Whether each joint was released at this instant and pulled back.
+    /// Whether each joint was released at the present instant and stuck again because its acceleration opposed the release.
     pub(super) tried: [bool; N],
-    /// Number of steps that ended short of the end of the interval, or were repeated.
+    /// Number of steps within the present interval that ended short of its end, or were repeated.
     pub(super) changes: usize,
 }
 
@@ -35,7 +36,7 @@ impl<T: Real, const N: usize> Clock<T, N> {
         self.done == T::zero() && self.goal.is_none()
     }
 
-    /// Advances by `time`, s, within the interval and forgets joints tried at the last instant.
+    /// Advances by `time`, s, within the interval, and clears `goal` and `tried`, which held at the instant before.
     #[inline]
     pub(super) fn pass(&mut self, time: T) {
         (self.done, self.left) = (self.done + time, self.left - time);

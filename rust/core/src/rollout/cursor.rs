@@ -19,7 +19,7 @@ use nalgebra::SVector;
 type Rows<'a, T, const N: usize> =
     Zip<Zip<Zip<Iter<'a, T>, Iter<'a, T>>, Iter<'a, [InputSegment<T>; N]>>, IterMut<'a, [T; N]>>;
 
-/// Position of a lane in its run: the current interval and those that follow.
+/// Position of a lane in its run: the current sample interval and those that follow.
 pub(super) struct RunCursor<'a, T, const N: usize> {
     rows: Rows<'a, T, N>,
     /// Current sample interval; `None` at the end of the run.

@@ -59,7 +59,7 @@ struct ElasticBatch<'r, 'a, T: Real, C, A, const W: usize, const N: usize, const
     divisions: [Division<T>; W],
     /// Whether each lane starts a sample interval.
     at_sample: [bool; W],
-    /// Index of the run in each lane; `cursors` has the lane's position in the run, `None` if the lane has ended.
+    /// Index of the run in each lane; `cursors` has each lane's position in its run, `None` if the lane has ended.
     runs: [usize; W],
     cursors: [Option<RunCursor<'a, T, N>>; W],
     /// Number of lanes that have not ended.
@@ -221,7 +221,7 @@ impl<'r, 'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, c
                 return self.set(l, &state);
             }
         }
-        // Steps of zero length of an arm at rest.
+        // A lane without a run takes steps of zero length with an arm at rest.
         self.moving -= 1;
         self.span.h.0[l] = T::zero();
         self.set(l, &State { modes: [Mode::Forward; N], ..State::new(SVector::zeros(), SVector::zeros()) });

@@ -39,20 +39,22 @@ pub(super) struct ElasticModes<V, const N: usize> {
 /// Part of a sample interval in every lane, with the motor torques over it.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ElasticSpan<V, const N: usize> {
-    /// Time at its start, s.
+    /// Time at the start of the part, s.
     pub(super) t: V,
-    /// Length, s.
+    /// Length of the part, s.
     pub(super) h: V,
-    /// Motor torques at the start, the middle and the end, N m (N).
+    /// Motor torques at the start, the middle and the end of the part, N m (N).
     pub(super) tau: [[V; N]; 3],
 }
 
-/// State at the end of a step of all lanes, and by how much the step contradicts what it assumed.
+/// State at the end of a step of all lanes, and whether the step contradicts its assumptions: fixed friction modes and a small change of angles.
 pub(super) struct ElasticStep<V, const N: usize> {
     pub(super) end: ElasticState<V, N>,
-    /// > 0 or NaN where friction modes contradict the motion, or where the motion is not finite or turns the arm beyond the angle range of a step.
+    /// Positive or NaN where friction modes contradict the motion, or where the motion is not finite or turns the arm beyond the angle range of a
+    /// step.
     pub(super) violation: V,
-    /// > 0 where a joint with regularised friction does not slide at the end in the direction in which it moves at the start.
+    /// Positive where a joint with regularised friction does not slide at the end of the step in the direction in which it moves at the start of the
+    /// step.
     pub(super) slowing: V,
 }
 
@@ -153,7 +155,8 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, const
         }
     }
 
-    /// Coulomb level and torque of the effects of joint `j`, N m (N), at the direction `along` of its friction.
+    /// Coulomb level and torque of the effects of joint `j`, N m (N), at the direction `along` of its friction and the direction `other` of that of
+    /// the joint after `j`.
     #[inline(always)]
     fn laws(
         &self,
@@ -194,7 +197,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, const
                     shaft.stiffness.fused(state.deflection[j], shaft.damping * state.deflection_rate[j]);
             }
         }
-        // Friction on motors leaves less of their torque.
+        // Friction that acts on a motor is subtracted from the motor's torque.
         let (mut braked, mut left) = ([zero; N], *tau);
         for j in 0..N {
             if !self.at_motor[j] {
@@ -267,7 +270,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, const
         StageMotion { ddq, deflection_acceleration, friction_at_rest, reaching }
     }
 
-    /// State `dt` seconds after `start`, at the velocities of `at` and the accelerations of `motion`.
+    /// State `dt` seconds after `start`, with the velocities of the state `at` and the accelerations of `motion` held constant.
     #[inline(always)]
     fn moved(
         start: &ElasticState<Lanes<T, C, W>, N>,
@@ -285,7 +288,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, const
         next
     }
 
-    /// Stiction violation of the stuck joints at the time `t`, N m (N): > 0 in lanes where one breaks away.
+    /// Largest stiction violation of the stuck joints at the time `t`, N m (N): > 0 in lanes where a joint breaks away.
     #[inline(always)]
     fn stiction_violation(
         &self,
@@ -378,13 +381,13 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, const
                 slowing = slowing.larger(c(SLIDING) - ahead * inverse_width);
             }
         }
-        // Motion that is not finite leaves its mark in this.
+        // NaN where the motion is not finite, else 0.
         let finite = total * c(0.0);
         let far = AngleRange::Near.part(far) - c(1.0);
         ElasticStep { end, violation: violation.larger(far) + finite, slowing }
     }
 
-    /// > 0 in lanes where a joint's velocity, or at rest its acceleration, contradicts the direction of its friction mode.
+    /// Number per lane, > 0 where a joint's velocity, or at rest its acceleration, contradicts the direction of its friction mode.
     #[inline(always)]
     fn contradictions(
         &self,
@@ -401,7 +404,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, const
                 acceleration = acceleration + motion.deflection_acceleration[j];
             }
             let off = contradiction(self.friction_velocity(j, state), acceleration, direction, slides);
-            // A joint without dry friction is none the worse for a wrong direction.
+            // A wrong sliding direction has no effect on a joint without dry friction.
             worst = worst.larger(if self.is_dry[j] { off } else { off * (one - slides) });
         }
         worst

@@ -15,7 +15,7 @@ pub(super) struct LaneStep<T, const N: usize> {
     pub(super) ddq: [[T; N]; 2],
     /// Static friction at the start and the end of the step, if any joint is stuck.
     pub(super) static_friction: Option<[StaticFriction<T, N>; 2]>,
-    /// > 0 or NaN if the step turns the arm beyond the angle range of one step.
+    /// Positive or NaN if the step turns the arm beyond the angle range of one step.
     pub(super) range_violation: T,
     /// Whether each joint has dry friction.
     pub(super) dry: [bool; N],
@@ -54,7 +54,8 @@ impl<T: Real, const N: usize> LaneStep<T, N> {
         outcome
     }
 
-    /// Releases the stuck joint whose friction torque at rest exceeds its Coulomb level by most, and sticks a released joint that is pulled back.
+    /// Releases the stuck joint whose friction torque at rest exceeds its Coulomb level by most, and sticks a released joint that is pulled back;
+    /// `None` if no friction mode at the start of the step has to change.
     fn settle(&self, clock: &mut Clock<T, N>, direction: &mut [T; N]) -> Option<StepOutcome<T, N>> {
         let (mut released, mut worst) = (None, T::zero());
         for j in 0..N {
@@ -86,7 +87,8 @@ impl<T: Real, const N: usize> LaneStep<T, N> {
         Some(StepOutcome::Repeat)
     }
 
-    /// Aims the next step at the earliest reversal within this one; accepts the step if there is none.
+    /// Repeats the step up to the earliest reversal within it; accepts the step if there is no reversal, and leaves it to the scalar integrator if a
+    /// stuck joint breaks away within it.
     fn first_change(&self, clock: &mut Clock<T, N>, direction: &[T; N]) -> StepOutcome<T, N> {
         let [start, end] = &self.ends;
         let mut first = None;
@@ -134,7 +136,7 @@ impl<T: Real, const N: usize> LaneStep<T, N> {
             _ => (T::zero(), *end),
         };
         joints.dq[j] = T::zero();
-        // As it seems; `settle` puts right what is not so.
+        // A first estimate of the sliding direction; `settle` corrects it if it contradicts the motion.
         let goes_on = -(self.ddq[1][j] * direction[j]) > self.acceleration_step(j);
         direction[j] = if goes_on { -direction[j] } else { T::zero() };
         clock.pass(length + more);

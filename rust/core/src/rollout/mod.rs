@@ -1,10 +1,10 @@
 //! Batch rollouts: many runs at once, one in each lane of a vector unit.
 //!
-//! Each run has its own plant, start, times and torques. A step is taken by all lanes at once with the friction modes they have
-//! ([`crate::fixed_mode`]), and every lane has its own clock: a lane in which a joint reverses within a step goes back to the start of the
-//! step, and takes a shorter step to the reversal and another to the sample while other lanes go on. Rarer events (a joint that
-//! breaks away within a step, a step beyond the angle range) are left to the scalar integrator ([`crate::integrate`]). Plants
-//! in which more than friction modes can change cannot run in a batch.
+//! Each run has its own plant, initial state, times and torques. A step is taken by all lanes at once, each with its present friction modes
+//! ([`crate::fixed_mode`]), and every lane has its own clock: a lane in which a joint reverses within a step goes back to the start of the step, and
+//! takes a shorter step to the reversal and another to the sample while other lanes go on. Rarer events (a joint that breaks away within a step, a
+//! step beyond the angle range) are left to the scalar integrator ([`crate::integrate`]). Plants in which more than friction modes can change cannot
+//! run in a batch.
 
 mod batch;
 mod clock;
@@ -36,8 +36,8 @@ pub struct Run<'a, T: Real, A, const N: usize, const P: usize> {
     pub torque: &'a [[InputSegment<T>; N]],
     /// State at the first sample; after the rollout, the state at the end of the run.
     pub state: State<T, N>,
-    /// Joint positions, rad or m, at all samples after the first, `N` for each; unchanged after the run has left the limit. The rollout takes the
-    /// slice.
+    /// Joint positions, rad or m, at all samples after the first, `N` for each; unchanged after the sample at which a position exceeds the limit. The
+    /// rollout takes the slice out of the run.
     pub positions: &'a mut [T],
 }
 
@@ -77,7 +77,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Kernel for BatchR
         if C::DOUBLES == WIDTH {
             return Self::run_batch::<C, 8, 1>(runs, limit);
         }
-        // Half the lanes take half the time.
+        // A remainder of at most half the lanes is simulated in vectors of half the length, which takes half the time.
         let over = runs.len() % WIDTH;
         let (most, few) = runs.split_at_mut(if over <= WIDTH / 2 { runs.len() - over } else { runs.len() });
         Self::run_batch::<C, 8, 1>(most, limit);

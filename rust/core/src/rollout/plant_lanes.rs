@@ -12,7 +12,8 @@ use crate::real::Real;
 use crate::trig::{Rotation, SinCos};
 use core::array::from_fn;
 
-/// State, torque and bias of a joint at an instant, copied for the effects' laws: compilers keep data in memory that a function not inlined can see.
+/// Time, position, velocity, motor torque and bias `C dq + g` of a joint at an instant, copied as arguments of the effects' laws: compilers keep data
+/// in memory to which a function that is not inlined has a reference.
 pub(super) struct JointInstant<V> {
     pub(super) t: V,
     pub(super) q: V,
@@ -44,7 +45,7 @@ pub(super) struct PlantLanes<'a, T: Real, C, A, const W: usize, const N: usize, 
 impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, const P: usize>
     PlantLanes<'a, T, C, A, W, N, P>
 {
-    /// Lanes that all have the plant `plant`.
+    /// Plants of a batch rollout of which all lanes have the plant `plant`.
     pub(super) fn new(plant: &'a Plant<T, A, N, P>) -> Self {
         let RigidArm { arm, theta, viscous, coulomb, constant_inertia, tilt } = plant.rigid();
         let rigid = RigidArm {
@@ -94,7 +95,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, const
     }
 
     /// Coulomb level of joint `j` in the lanes where it slides, in `direction`, and torque of the effects on joint `j`, N m (N); `other` is the
-    /// direction in which the next joint slides.
+    /// direction in which the joint after `j` slides.
     #[inline(never)]
     pub(super) fn laws(
         &self,
@@ -125,7 +126,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, const
         self.plants[l].point(j, at.t.0[l], at.q.0[l], at.dq.0[l], at.tau.0[l], at.bias.0[l])
     }
 
-    /// Coulomb levels of joint `j` in the lanes where it slides, N m (N).
+    /// Coulomb levels of joint `j` in the lanes where it slides in `direction`, at the states `x` of the lanes, N m (N).
     #[inline]
     fn levels(&self, x: &[JointPoint<T>; W], direction: Lanes<T, C, W>, j: usize) -> Lanes<T, C, W> {
         let mut levels = self.rigid.coulomb[j];
@@ -155,7 +156,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, const
         levels
     }
 
-    /// Torques of the effects on joint `j`, N m (N).
+    /// Torques of the effects on joint `j` at the states `x` of the lanes, N m (N).
     #[inline]
     fn forces(&self, x: &[JointPoint<T>; W], j: usize) -> Lanes<T, C, W> {
         let mut sums = [T::zero(); W];
@@ -194,7 +195,8 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, const
     }
 }
 
-/// Dynamics of plants side by side. Without `EFFECTS` it is known at compile time whether any joint is stuck, and a step has no branch.
+/// Dynamics of the plants of a batch rollout, one in each lane. Without `EFFECTS` it is known at compile time, from `ANY_STUCK`, whether any joint is
+/// stuck, and a step has no branch.
 pub(super) struct LaneDynamics<'b, B, const EFFECTS: bool, const ANY_STUCK: bool>(pub(super) &'b B);
 
 impl<
@@ -245,7 +247,7 @@ impl<
                     self.0.laws(&JointInstant::of(at, j), direction[j], direction[(j + 1) % N], j);
                 (level, generalized_force[j]) = (own, generalized_force[j] + force);
             }
-            // What is known first is subtracted first: the bias is not.
+            // Terms are subtracted in the order in which they are computed, the bias last.
             let driven = (-viscous)
                 .fused(at.kinematics.joints.dq[j], (-level).fused(direction[j], generalized_force[j]));
             generalized_force[j] = driven - at.kinematics.equation_terms.bias[j];

@@ -8,10 +8,10 @@ use crate::model::hypothesis::Hypothesis;
 use crate::predict::residual_torque::{InverseDynamicsResidual, inverse_dynamics_residuals};
 use armgap_core::arm::Arm;
 
-/// Half width, in samples, of the local cubic that accelerations are taken from; an impact is short.
+/// Half width, in samples, of the local cubic from which accelerations are taken; small because an impact is short.
 const HALF_WIDTH: usize = 3;
 
-/// Fewest samples beyond a joint limit for a guess of its stiffness.
+/// Fewest samples beyond a joint limit for a guess of the limit's stiffness.
 const FEWEST: usize = 5;
 
 /// Growth factor of the number of samples beyond a joint limit, from one tried position of the limit to the next.
@@ -20,10 +20,10 @@ const GROWTH: f64 = 1.15;
 /// Largest part of a joint's samples that may lie beyond a joint limit.
 const MOST: f64 = 0.8;
 
-/// Least part of the squared residual torque beyond a joint limit that its spring and damper must explain.
+/// Least part of the squared residual torque beyond a joint limit that the limit's spring and damper must explain.
 const EXPLAINS: f64 = 0.3;
 
-/// Speed below which friction is regularised, relative to the joint's RMS speed, in the search for contacts.
+/// Speed below which friction is regularised in the search for contacts, relative to the RMS speed of the slowest joint.
 const SLOW: f64 = 0.02;
 
 /// Guess of a contact: position (rad or m), stiffness (N m/rad or N/m) and damping (N m s/rad or N s/m).
@@ -40,7 +40,8 @@ struct ContactSample {
 /// Factor from the fitted stiffness of a contact to a second, stiffer guess: an impact shorter than the local cubic appears softer than it is.
 const HARDER: f64 = 8.0;
 
-/// Guesses of contacts that logs show under a model, per joint: at most one contact on either side, each with its fitted stiffness and a stiffer one.
+/// Guesses of contacts from the residual torque of logs under a model, per joint: at most one contact on either side of zero, each with its fitted
+/// stiffness and a stiffer one; `speed` is the RMS speed per joint, rad/s or m/s.
 pub fn contact_guesses<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     tracks: &[Track<N>],
     arm: &A,
@@ -75,7 +76,7 @@ fn both(samples: &mut [ContactSample], side: f64) -> Vec<ContactGuess> {
     vec![guess, [position + depth - shallower, HARDER * stiffness, HARDER.sqrt() * damping]]
 }
 
-/// Spring and damper on one side of zero (`side` = 1 or -1) that explain most of a joint's residual torque.
+/// Contact on one side of zero (`side` = 1 or -1) whose spring and damper explain most of a joint's squared residual torque.
 fn hinge(samples: &mut [ContactSample], side: f64) -> Option<ContactGuess> {
     samples.sort_by(|a, b| (side * b.q).total_cmp(&(side * a.q)));
     let most = (MOST * samples.len() as f64) as usize;
@@ -89,7 +90,7 @@ fn hinge(samples: &mut [ContactSample], side: f64) -> Option<ContactGuess> {
     tried.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(guess, _)| guess)
 }
 
-/// Least-squares stiffness and damping of a contact at `position`, from the samples `beyond` it, and the squared torque explained.
+/// Least-squares stiffness and damping of a contact at `position`, rad or m, from the samples `beyond` it, and the squared torque explained.
 fn spring(beyond: &[ContactSample], position: f64, side: f64) -> Option<([f64; 2], f64)> {
     let [mut dd, mut dv, mut vv, mut dy, mut vy, mut yy] = [0.0; 6];
     for sample in beyond {

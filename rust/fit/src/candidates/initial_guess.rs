@@ -15,10 +15,12 @@ use armgap_core::effect::Trial;
 /// Largest number of candidates that get a full fit at each node of the model search.
 const FULL_FITS: usize = 18;
 
-/// Part of a candidate's sensitivity left unexplained by the arm's own parameters below which only their prior can reveal the candidate.
+/// Share of a candidate's squared sensitivity that the arm's own parameters cannot imitate, below which only the prior of the parameters can
+/// distinguish the candidate from a change of the parameters.
 const ABSORBED: f64 = 0.03;
 
-/// Part of a candidate's sensitivity left unexplained by the arm's own parameters below which derivatives cannot tell it from them.
+/// Share of a candidate's squared sensitivity that the arm's own parameters cannot imitate, below which derivatives do not determine the candidate's
+/// size.
 const IMITATED: f64 = 1e-4;
 
 /// Least part of the training cost that a candidate must remove to first order to be fitted.
@@ -30,7 +32,7 @@ const TRACE_IN_SMALL: f64 = 0.2;
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
     /// Hypotheses that are worth a full fit, each the fitted model with one more candidate, and the score tests of all candidates (those not in the
-    /// model first; empty if no test was made). `size` is the relative size of the gap.
+    /// model first; empty if no test was made). `size` is the RMS prediction error relative to the motion, without relevance up to `min_relevance`.
     pub(crate) fn initial_guesses(
         &self,
         fit: &Fit<P>,
@@ -56,7 +58,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         });
         let mut initial_guesses: Vec<Hypothesis<P>> = more.collect();
         if !is_plausible::<P>(fit.prior_cost) {
-            // A contact that always carries a part of the load has spoilt the values that are fitted without it.
+            // A contact that carries a part of the load all the time has biased the parameters that were fitted without it.
             let trusted = Hypothesis { theta: self.prior.theta, ..fit.hypothesis.clone() };
             initial_guesses
                 .extend(self.contact_guesses(&all, &trusted).into_iter().map(|stop| trusted.with(stop)));
@@ -72,7 +74,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         gains.fold(0.0, f64::max) / self.above_floor(cost, weights)
     }
 
-    /// Cost of the training windows above what noise alone would leave.
+    /// Part of the training windows' cost `cost` above the expected cost of measurement noise alone.
     fn above_floor(&self, cost: f64, weights: &SplitWeighting<N>) -> f64 {
         let rows = self.training.data.rows as f64 / self.holdout.data.rows as f64;
         (cost - rows * self.floor(weights)).max(1e-9 * cost)
@@ -160,8 +162,9 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         Some(initial_guess)
     }
 
-    /// The model with one more candidate. Where the arm's parameters can imitate the candidate, they are shifted to compensate it; where they imitate
-    /// it to rounding, so that motion does not determine its size, the size brings them closest to their prior values.
+    /// The model with one more candidate. Where the arm's parameters can imitate the candidate, they are shifted to compensate it; where the
+    /// imitation is exact to rounding, so that motion does not determine the candidate's size, the size is that which brings the parameters closest
+    /// to their prior values.
     fn compensated(&self, model: &Hypothesis<P>, found: &ScoreTest) -> Hypothesis<P> {
         if found.distinct >= ABSORBED {
             return model.with(found.effect);
@@ -173,7 +176,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         model.with_values(&room).with(effect)
     }
 
-    /// A candidate at the size that brings the arm's parameters closest to their prior values, and this size.
+    /// A candidate at the size that brings the arm's parameters, shifted to compensate it, closest to their prior values; and this size, as a
+    /// deviation of the tested parameter from its neutral value.
     fn trusted(&self, model: &Hypothesis<P>, found: &ScoreTest) -> (EffectInstance, f64) {
         let parameter = &found.effect.law.spec().parameters[found.tested];
         let (mut along, mut off) = (0.0, 0.0);
@@ -190,14 +194,15 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
 }
 
 /// Best initial guesses of the candidates to be fitted: those with the largest gains in the score test, above `least`, and those that the arm's
-/// parameters imitate to within `ABSORBED`, which only the prior of the parameters can tell from them.
+/// parameters imitate but for a share of `ABSORBED`, which only the prior of the parameters can distinguish from a change of them.
 fn promising(screened: &[ScoreTest], least: f64) -> Vec<&ScoreTest> {
     let mut order: Vec<&ScoreTest> = screened.iter().filter(|s| s.gain > 0.0).collect();
     order.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     let mut chosen: Vec<&ScoreTest> = Vec::new();
     for scored in order {
         let wanted = (chosen.len() < FULL_FITS && scored.gain > least) || scored.distinct < ABSORBED;
-        // A test at a trial value says little about the best initial guess, so two of them are taken; so are two peaks of a periodogram.
+        // A score test at a trial value says little about the best initial guess, so two initial guesses are taken; so are two peaks of a
+        // periodogram.
         let several = scored.effect.law.spec().trial == Trial::Whole || scored.effect.is_periodic();
         let initial_guesses = if several { 2 } else { 1 };
         if wanted && chosen.iter().filter(|c| c.effect.same_place(&scored.effect)).count() < initial_guesses {

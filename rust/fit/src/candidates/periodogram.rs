@@ -1,8 +1,8 @@
 //! Periodogram of the residual over position: initial guesses of ripple, with its cycles per turn of a joint.
 //!
-//! Over a short window a torque `sin(n q)` changes the predicted position by nearly its double integral over the joint's own inertia. For every
-//! `n` of a grid, sine and cosine are fitted to the residuals of all windows after removal of an offset and a drift, as an error of the
-//! initial state causes: least-squares spectral analysis (Lomb 1976) over position in place of time.
+//! Over a short window a torque `sin(n q)` changes the predicted position by nearly its double integral over time, divided by the joint's own
+//! inertia. For every `n` of a grid, sine and cosine are fitted to the residuals of all windows after removal of an offset and a drift, such as an
+//! error of the initial state causes: least-squares spectral analysis (Lomb 1976) over position in place of time.
 
 use crate::likelihood::solve::FitProblem;
 use crate::model::hypothesis::Hypothesis;
@@ -15,7 +15,7 @@ use rayon::prelude::*;
 /// Step of the periodogram's grid, in cycles over the joint's travel: half the width of a peak.
 const RESOLUTION: f64 = 0.5;
 
-/// Fewest cycles of ripple over a joint's travel in the periodogram; slower ripple is much like gravity and has fixed initial guesses.
+/// Fewest cycles of ripple over a joint's travel in the periodogram; ripple with fewer cycles resembles gravity and has fixed initial guesses.
 const FEWEST: f64 = 2.0;
 
 /// Largest phase advance of ripple per sample at the joint's RMS speed, rad.
@@ -72,7 +72,7 @@ pub fn periodogram_peaks<A: Arm<f64, N, P>, const N: usize, const P: usize>(
 struct Path {
     /// Positions of the joint halfway between samples, rad or m, from the interval that ends at the window's first predicted sample.
     q: Vec<f64>,
-    /// Acceleration per unit torque of the joint, in units of the residual's scale.
+    /// Acceleration of the joint per unit of its torque, divided by the standard deviation of the joint's position residual, per sample interval.
     gain: Vec<f64>,
     /// Lengths of the sample intervals, s.
     h: Vec<f64>,
@@ -80,7 +80,7 @@ struct Path {
     residual: Vec<f64>,
     /// Linear function of time with zero mean and unit norm: the drift that is removed from the residual.
     drift: Vec<f64>,
-    /// Robust weight of the window, 0 to 1.
+    /// Robust weight of the window in the fit whose residual is examined.
     weight: f64,
 }
 
@@ -147,7 +147,7 @@ struct Spectrum<'a> {
     step: f64,
 }
 
-/// One number for each frequency of a batch of the periodogram.
+/// Values of one quantity at all frequencies of a batch of the periodogram.
 type Each = [f64; BATCH];
 
 impl Kernel for Spectrum<'_> {

@@ -12,11 +12,11 @@ use armgap_core::transmission::Sides;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-/// Displacement of a candidate's tested parameter for its sensitivity, relative to its initial guess.
+/// Displacement of a candidate's tested parameter for derivatives by forward differences, relative to the parameter's initial guess.
 const TRIAL: f64 = 1e-3;
 
-/// One in this many initial guesses of a transmission is tried where encoder or friction is on the motor's side, in a search beside other effects:
-/// the latent states before a window take as long to simulate as the window itself.
+/// One in this many initial guesses of a transmission is tried with encoder or friction on the motor's side where the model already has effects: the
+/// latent states before a window take as long to simulate as the window itself.
 const MOTOR_GUESSES: usize = 3;
 
 /// Score test of a candidate at one initial guess.
@@ -24,13 +24,13 @@ const MOTOR_GUESSES: usize = 3;
 pub struct ScoreTest {
     /// The candidate effect, its tested parameter at the value that the score test suggests.
     pub effect: EffectInstance,
-    /// Expected decrease of the cost by the candidate.
+    /// Expected decrease of the cost when the candidate is added to the model.
     pub gain: f64,
     /// Estimated deviation of the tested parameter from its neutral value, in the parameter's unit.
     pub estimate: f64,
     /// Standard deviation of the estimated deviation of the tested parameter, from the scatter between windows.
     pub sigma: f64,
-    /// Standard deviation of the tested parameter if the residual were white with the weighting's scale: the best that the logs allow.
+    /// Standard deviation of the tested parameter if the residual were white with the weighting's scale: the smallest that the logs allow.
     pub information_sigma: f64,
     /// Changes of the model's free values that compensate the candidate, to first order, per unit of the tested parameter.
     pub imitation: Vec<f64>,
@@ -139,7 +139,8 @@ fn tested(candidate: &EffectInstance) -> usize {
     (0..candidate.len()).find(|&i| candidate.p[i] != off.p[i]).unwrap_or(0)
 }
 
-/// Sensitivity of the whitened prediction to the tested parameter at neutral (or the full change by the effect, with its decrease of the cost).
+/// Derivative of the whitened prediction by the candidate's tested parameter at its neutral value; for an effect with a threshold the whole change of
+/// the prediction by the effect instead, with the decrease of the cost.
 fn trace<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     problem: &FitProblem<A, N, P>,
     base: &Hypothesis<P>,
@@ -160,7 +161,7 @@ fn trace<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     };
     let there = problem.residual(&base.with(moved));
     problem.progress.unit();
-    // What begins beyond a threshold may show in few windows, which weigh next to nothing until it explains them.
+    // An effect with a threshold may act in few windows, whose robust weights are nearly zero until the effect explains their residuals.
     let direct =
         (candidate.law.spec().trial == Trial::Whole).then(|| before - student_t_total(problem, &there));
     (residual.iter().zip(&there).map(|(here, there)| (here - there) / step).collect(), direct)
@@ -179,7 +180,8 @@ fn student_t_total<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         .sum()
 }
 
-/// Score test of one candidate from its information, slope and scatter; a parameter that would have to cross its bound has no gain.
+/// Score test of one candidate from the squared length `raw` of its sensitivity, and information, slope and scatter after projection on the model's
+/// free values; a parameter that would have to cross its bound has no gain.
 fn scored(effect: &EffectInstance, raw: f64, information: f64, slope: f64, scatter: f64) -> ScoreTest {
     let estimate = slope / information;
     let mut suggested = *effect;
@@ -198,7 +200,7 @@ fn scored(effect: &EffectInstance, raw: f64, information: f64, slope: f64, scatt
             suggested.p = effect.p.map(|x| x * share);
             share
         }
-        // A share of the whole difference, from none to all of it.
+        // The estimate is a share of the effect's whole change of the predictions, 0 to 1.
         Trial::Whole | Trial::Disturbance => estimate.clamp(0.0, 1.0),
     };
     let gain = if raw > 0.0 { (2.0 * slope - information * admissible) * admissible } else { 0.0 };

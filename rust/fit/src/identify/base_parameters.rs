@@ -93,7 +93,7 @@ fn stacked<const N: usize>(chain: &Chain<f64, N>) -> Vec<Vec<f64>> {
     columns
 }
 
-/// `Q R` factorisation of the regressor columns examined so far.
+/// `Q R` factorisation of the independent ones among the regressor columns examined so far.
 #[derive(Debug, Default)]
 struct Basis {
     /// Length of a column's independent component below which the column counts as dependent.
@@ -111,7 +111,7 @@ impl Basis {
     fn take(&mut self, parameter: usize, column: &[f64]) {
         let (length, mut rest) = (norm(column), column.to_vec());
         let mut along = vec![0.0; self.q.len()];
-        // Twice: what rounding left of the first time is removed by the second.
+        // Orthogonalised twice: the second pass removes what rounding left in the first.
         for _ in 0..2 {
             for (direction, along) in self.q.iter().zip(&mut along) {
                 let share: f64 = direction.iter().zip(&rest).map(|(a, b)| a * b).sum();
@@ -155,7 +155,7 @@ impl Basis {
             x.iter_mut().zip(column).for_each(|(x, r)| *x -= share * r);
             x[i] = share;
         }
-        // Rounding is not a share.
+        // Coefficients as small as rounding errors are set to zero.
         let largest = x.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
         x.iter().map(|x| if x.abs() <= ROUNDING * largest.max(1.0) { 0.0 } else { *x }).collect()
     }

@@ -14,7 +14,8 @@ use armgap_core::arm::Arm;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-/// Displacement of a parameter for forward differences, relative to its first value; the error of event location is far smaller.
+/// Displacement of a parameter for forward differences, relative to the parameter's initial value; the error of event location in rollouts is far
+/// smaller.
 const RELATIVE_STEP: f64 = 1e-6;
 
 /// Largest number of Levenberg-Marquardt iterations.
@@ -59,7 +60,7 @@ pub struct Estimate {
 impl WithArm for OutputError<'_> {
     type Output = Option<Estimate>;
 
-    /// The minimum of the output error reached from the arm's own parameters `theta`; `None` for a log shorter than one window.
+    /// Parameters at the minimum of the output error that is reached from the initial values `theta`; `None` for a log shorter than one window.
     fn call<A: Arm<f64, N, P>, const N: usize, const P: usize, const R: usize>(
         self,
         arm: A,

@@ -1,9 +1,9 @@
 //! The arm's parameters re-estimated without any effect, under the arm file's standard deviations as prior.
 //!
 //! The plausibility checks of the input compare a log as it stands with the log after correction of a defect. The scale of the residual is estimated
-//! with the parameters, so the cost has several minima: far from the logs the residual is large, the prior outweighs it, and the parameters stay
-//! where they are. So the fit also starts from parameters that a linear regression finds, as an arm with an unknown load or a wrong arm file
-//! requires.
+//! with the parameters, so the cost has several minima: where the parameters predict the logs badly, the scale of the residual is large, the prior
+//! outweighs the residual, and the parameters hardly move. So the fit also starts from parameters that a linear regression finds, as an arm with an
+//! unknown load or a wrong arm file requires.
 
 use crate::diagnose::Request;
 use crate::likelihood::context::WindowSet;
@@ -29,7 +29,8 @@ pub struct Refit {
     pub motion: Vec<f64>,
 }
 
-/// Re-estimates the arm's parameters from the arm file and from `start`; returns the fit that predicts the training logs better.
+/// Re-estimates the arm's parameters twice, with the arm file's values and with `start` as initial values; returns the fit that predicts the training
+/// logs better.
 ///
 /// # Errors
 ///

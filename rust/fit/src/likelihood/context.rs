@@ -16,10 +16,11 @@ const MAX_ROUNDS: usize = 5;
 /// Ratio of successive residual scales of every joint below which re-weighting ends.
 const SETTLED: f64 = 1.1;
 
-/// Rounds of alternating estimation of encoder zeros and parameters, to find how much of the cost zeros explain.
+/// Rounds of alternating estimation of encoder zeros and parameters, to find how much of the training cost encoder zeros explain.
 const ZERO_ROUNDS: usize = 2;
 
-/// Gauss-Newton steps in the fit of the encoder zeros of holdout recordings; those of training recordings continue from round to round.
+/// Gauss-Newton steps in the fit of the encoder zeros of holdout recordings; the zeros of training recordings take one step in each round of
+/// re-weighting.
 const HOLDOUT_ROUNDS: usize = 2;
 
 /// Context of a diagnosis: the arm, its prior, scales, and windows.
@@ -36,7 +37,7 @@ pub struct DiagnosisContext<A, const N: usize, const P: usize> {
     pub holdout: WindowSet<N>,
     /// Standard deviation of the position measurement per joint, rad or m.
     pub noise: [f64; N],
-    /// Per joint, the sides of the transmission that encoder and friction may be on, both on one side first.
+    /// Per joint, the sides of the transmission that encoder and friction may be on, those with both on one side first.
     pub sides: [Vec<Sides>; N],
     /// Custom effects at their initial guesses.
     pub custom_effects: Vec<EffectInstance>,
@@ -78,7 +79,7 @@ impl<const N: usize> WindowSet<N> {
     }
 }
 
-/// Fitted encoder zeros, the windows' offsets with these zeros, and offsets with initial states fitted too.
+/// Fitted encoder zeros, and the windows' initial-state offsets that were fitted together with them.
 struct FittedZeros<const N: usize> {
     zeros: EncoderZeros<N>,
     offsets: Vec<InitialStateOffset<N>>,
@@ -109,12 +110,12 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         }
     }
 
-    /// Fitting problem on the training windows under this weighting.
+    /// Fitting problem on the training windows with the weighting `weighting`.
     pub fn problem<'a>(&'a self, weighting: &'a Weighting<N>) -> FitProblem<'a, A, N, P> {
         self.on(&self.training, weighting)
     }
 
-    /// Fitting problem on the holdout windows under this weighting.
+    /// Fitting problem on the holdout windows with the weighting `weighting`.
     pub fn judge<'a>(&'a self, weighting: &'a Weighting<N>) -> FitProblem<'a, A, N, P> {
         self.on(&self.holdout, weighting)
     }
@@ -131,7 +132,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         }
     }
 
-    /// Encoder zeros of the training recordings, and of the further recordings in a sample, fitted to a hypothesis.
+    /// Encoder zeros `training` of the training recordings, and zeros of the other recordings in `sample` fitted under a hypothesis; `scale` per
+    /// joint, rad or m.
     pub(crate) fn zeros_beside(
         &self,
         sample: &WindowSet<N>,
@@ -151,7 +153,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         zeros
     }
 
-    /// Weightings around a hypothesis with initial states fitted to it, residual scales `scale` and the encoder zeros of `given`.
+    /// Weightings of training and holdout windows with initial states fitted under a hypothesis, the residual scales `scale` per joint, rad or m, and
+    /// the encoder zeros of `given`.
     pub fn reweighted(
         &self,
         hypothesis: &Hypothesis<P>,
@@ -183,7 +186,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         weighting.robust(&sample.data, &residual).with_zeros(zeros)
     }
 
-    /// Weighting with given encoder zeros whose initial states have been fitted to the hypothesis once, and linearised around them.
+    /// Weighting of the windows `sample` with the encoder zeros `zeros`: initial states are fitted once under the hypothesis, and predictions
+    /// linearised around these initial states.
     pub fn weighting(
         &self,
         sample: &WindowSet<N>,
@@ -197,8 +201,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         weighting.robust(&sample.data, &residual).with_zeros(zeros.clone())
     }
 
-    /// Weighting of the residuals after one fit of encoder zeros and initial states to the hypothesis, from the first guess `zeros`; `fitted`
-    /// estimates the zeros from the inner products of the sensitivities of residuals to them.
+    /// Encoder zeros and initial-state offsets after one Gauss-Newton step under the hypothesis from the first guess `zeros`; `fitted` estimates the
+    /// zeros from the inner products of the derivatives of the predictions by the zeros.
     fn fitting_zeros(
         &self,
         sample: &WindowSet<N>,
@@ -229,8 +233,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         FittedZeros { zeros, offsets }
     }
 
-    /// Weighting around predictions from initial states with these offsets, their residual, and their derivatives by initial positions and
-    /// velocities.
+    /// Weighting linearised around the predictions from initial states with the offsets `offsets`, the whitened residual of these predictions, and
+    /// their derivatives by initial positions and velocities.
     fn linearised(
         &self,
         sample: &WindowSet<N>,
@@ -247,13 +251,13 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         (weighting, residual, sensitivities)
     }
 
-    /// Fits the model and re-estimates the residual scales alternately, from `scale` down to the residual's own, with encoder zeros that differ
-    /// between recordings.
+    /// Fits the model and re-estimates the residual scales alternately, from the first scales `scale` per joint, rad or m, until both agree, with
+    /// encoder zeros that may differ between recordings.
     pub fn settle(&self, start: &Hypothesis<P>, scale: [f64; N]) -> (Fit<P>, SplitWeighting<N>) {
         self.settled(start, scale, EncoderZeros::can_be_told_from(&self.training.data))
     }
 
-    /// Fits the model and re-estimates the residual scales alternately, with the model's encoder zeros in every recording.
+    /// Fits the model and re-estimates the residual scales, rad or m, alternately until both agree, with the same encoder zeros in all recordings.
     pub(crate) fn settle_without_zeros(
         &self,
         start: &Hypothesis<P>,
@@ -291,7 +295,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     }
 
     /// Student-t cost of the training windows after parameters and encoder zeros of the recordings are estimated together, with the scales and the
-    /// typical window cost of `weighting`, which has no such zeros.
+    /// median window cost of `weighting`, which contains no encoder zeros.
     pub(crate) fn cost_with_zeros(&self, fit: &Fit<P>, weighting: &Weighting<N>) -> f64 {
         let mut beside = weighting.clone();
         let mut hypothesis = fit.hypothesis.clone();
@@ -303,8 +307,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         costs.into_iter().map(|cost| weighting.student_t_cost(cost)).sum()
     }
 
-    /// Scale of each joint's residual under a hypothesis, rad or m: RMS after the fit of initial states, widened by its correlation in time,
-    /// and at least the noise of the position measurement.
+    /// Scale of each joint's residual under a hypothesis, rad or m: RMS residual after the fit of initial states, times the square root of its
+    /// autocorrelation time in samples, and at least the noise of the position measurement.
     pub fn residual_scale(&self, weighting: &Weighting<N>, hypothesis: &Hypothesis<P>) -> [f64; N] {
         let problem = self.problem(weighting);
         let residual = problem.residual(hypothesis);
@@ -322,7 +326,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         })
     }
 
-    /// First scale of each joint's residual, rad or m: the typical window's RMS error of `hypothesis`, the arm file as it is.
+    /// Initial scale of each joint's residual, rad or m: median over windows of the RMS prediction error of `hypothesis`, before any fit, and at
+    /// least the measurement noise.
     pub fn rough_scale(&self, hypothesis: &Hypothesis<P>) -> [f64; N] {
         let data = &self.training.data;
         let predicted = data.predict(&self.arm, hypothesis, &data.zero_offsets());
@@ -337,7 +342,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     }
 }
 
-/// Runs `round(1)`, `round(2)`, … until a round returns that it is the last.
+/// Calls `round(1)`, `round(2)`, … until a call returns true.
 fn loop_rounds(mut round: impl FnMut(usize) -> bool) {
     let mut count = 1;
     while !round(count) {
@@ -363,7 +368,8 @@ fn bounded<const N: usize>(
     offsets
 }
 
-/// RMS of pooled windows by their robust weights, times the square root of the residual's autocorrelation time in samples (at least one).
+/// RMS residual over all windows, weighted by their robust weights, times the square root of the residual's autocorrelation time in samples (at least
+/// one).
 fn correlated_rms(windows: &[Vec<f64>], robust_weight: &[f64]) -> f64 {
     let moment = |lag: usize| -> f64 {
         let product = |w: &Vec<f64>| w.iter().zip(w.iter().skip(lag)).map(|(a, b)| a * b).sum::<f64>();

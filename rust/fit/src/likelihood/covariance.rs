@@ -19,7 +19,7 @@ use crate::likelihood::weighting::Gram;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-/// Factor by which a fitted value's variance would grow without a window from which the window is indispensable to the value.
+/// Factor by which the variance of a fitted value grows when one window is left out, from which the window counts as indispensable to the value.
 const INDISPENSABLE: f64 = 1e3;
 
 /// Addition to the unit diagonal of a scaled curvature matrix that keeps it invertible.
@@ -50,7 +50,7 @@ impl ParameterCovariance {
     }
 
     /// Covariance of values fitted with the inner products `gram`, under a prior of the precisions `prior_precision`. A value that changes no
-    /// prediction is taken as uniform within its `range`.
+    /// prediction is taken as uniformly distributed over the width `range`, one per value.
     pub fn new(gram: &Gram, prior_precision: &[f64], range: &[f64]) -> Self {
         let k = prior_precision.len();
         let precision = |i: usize| gram.total[(i, i)] + prior_precision[i];
@@ -76,7 +76,7 @@ impl ParameterCovariance {
     }
 }
 
-/// Covariance and degrees of freedom of the values on which predictions depend, each in units of its standard deviation given the others.
+/// Covariance and degrees of freedom of the values on which predictions depend, each in units of its standard deviation given all other values.
 struct Determined {
     covariance: DMatrix<f64>,
     degrees_of_freedom: Vec<f64>,
@@ -117,14 +117,15 @@ impl Determined {
     }
 }
 
-/// Cost of a window relative to the mean over all windows, at least one.
+/// Cost of a window relative to the mean cost of all windows, at least one.
 fn relative_cost(gram: &Gram, window: usize) -> f64 {
     let left = |score: &DVector<f64>| score[score.len() - 1];
     let average = gram.scores.iter().map(left).sum::<f64>() / gram.scores.len() as f64;
     if average > 0.0 { (left(&gram.scores[window]) / average).max(1.0) } else { 1.0 }
 }
 
-/// Whether part `rest` of the curvature `whole` still determines every value, given the earlier values.
+/// Whether the curvature of the cost over all windows but one, with Cholesky factor `rest`, still determines every value given the values before it,
+/// compared with the curvature over all windows, with Cholesky factor `whole`.
 fn determines(rest: &Cholesky<f64, Dyn>, whole: &Cholesky<f64, Dyn>) -> bool {
     let (rest, whole) = (rest.l_dirty(), whole.l_dirty());
     (0..rest.nrows()).all(|i| rest[(i, i)].powi(2) * INDISPENSABLE > whole[(i, i)].powi(2))
@@ -135,7 +136,7 @@ mod tests {
     use super::*;
     use crate::numeric::random::Random;
 
-    /// Two values fitted to noise, with columns of these sizes in each window: the values and their covariance.
+    /// Two values fitted to noise, with regressor columns of the standard deviations `sizes` in each window: the values and their covariance.
     fn fitted(sizes: &[[f64; 2]], random: &mut Random) -> ([f64; 2], ParameterCovariance) {
         let mut rows: Vec<Vec<[f64; 3]>> = sizes
             .iter()

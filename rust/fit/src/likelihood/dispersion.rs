@@ -1,9 +1,9 @@
 //! Dispersion factor: standard deviations widened by the difference between fits to the training logs and to the holdout.
 //!
-//! A covariance from one set of windows contains their scatter around their common fit, but no error that they share: an initial state
-//! behind a gear, friction that is smoother than the model's. An error that differs from motion to motion shows when one model is fitted
-//! to further motions. Standard deviations are widened by the factor by which two fits differ more than they should (the dispersion
-//! ratio of Birge 1932, over all values that the logs determine, and each value's own contribution).
+//! A covariance from one set of windows reflects the scatter of the windows around their common fit, but no error that all windows share, such as
+//! that of an initial state behind a gear, or of friction that is smoother than the model's. An error that differs from motion to motion becomes
+//! visible when the model is also fitted to further motions. Standard deviations are widened by the factor by which two fits differ more than their
+//! covariances say (the dispersion ratio of Birge 1932, over all values that the logs determine, and each value's own contribution).
 
 use crate::likelihood::context::{DiagnosisContext, SplitWeighting};
 use crate::likelihood::solve::{Effort, Fit};
@@ -12,7 +12,8 @@ use armgap_core::arm::Arm;
 /// Ratio of a value's standard deviation to its prior standard deviation below which a fit counts as determining the value.
 const DETERMINED: f64 = 0.5;
 
-/// Weight of a value's own squared difference beside the dispersion of all values: one observation of one degree of freedom.
+/// Factor on the squared difference of one value between two fits, a single observation of one degree of freedom; the larger of the product and the
+/// mean of the squared differences of all values is the square of the value's dispersion factor.
 const OWN: f64 = 0.5;
 
 /// Largest dispersion factor of a standard deviation.
@@ -32,7 +33,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             .iter()
             .map(|own| shared.max(own.unwrap_or(0.0) * OWN).clamp(1.0, MOST * MOST).sqrt())
             .collect();
-        // What the arm file says of a value is no narrower for being told apart worse by the logs.
+        // The standard deviation of an arm parameter is not widened beyond the arm file's, which holds without any log.
         let widest = |i: usize| if i < P { self.prior.sigma[i] } else { f64::INFINITY };
         let scale: Vec<f64> = (0..factor.len())
             .map(|i| {
@@ -45,7 +46,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         other
     }
 
-    /// Squared difference of every value between two fits in units of its variance; `None` for values that the logs do not determine.
+    /// Squared difference of every value between two fits in units of the sum of its variances in both; `None` for values that the logs do not
+    /// determine.
     fn squared_differences(&self, here: &Fit<P>, there: &Fit<P>) -> Vec<Option<f64>> {
         let (a, b) = (here.hypothesis.values(), there.hypothesis.values());
         let one = |i: usize| {

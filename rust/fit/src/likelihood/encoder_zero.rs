@@ -11,25 +11,29 @@ use crate::likelihood::weighting::Gram;
 use crate::predict::window::{Dataset, InitialStateOffset};
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
-/// Largest and first standard deviation of encoder zeros between recordings, rad or m: six degrees, as of an arm that is set to its
-/// zero by hand against friction (docs/real-arm.md). More is no scatter of one zero but another zero, which the checks of the input look for.
+/// Upper bound and initial value of the standard deviation of encoder zeros between recordings, rad or m: six degrees, as of an arm that is set to
+/// its zero by hand against friction (docs/real-arm.md). Larger differences are not scatter but a different zero, which the checks of the input look
+/// for.
 const LARGEST_SPREAD: f64 = 0.1;
 
-/// Rounds of expectation maximisation: tens settle a non-zero standard deviation of the zeros, hundreds bring a vanishing one down to zero.
+/// Number of iterations of expectation maximisation: a non-zero standard deviation of the encoder zeros converges in tens of them, one that vanishes
+/// approaches zero in hundreds.
 const ROUNDS: usize = 300;
 
-/// Prior odds that encoders whose zeros scatter have an offset besides. At 1, the mean of three or four recordings' zeros is named as an offset at
-/// 0.67 and 0.75 on arms without one; at 0.01 an offset of four times the scatter of three recordings is doubtful.
+/// Prior odds that a joint whose encoder zeros differ between recordings also has an encoder offset shared by all of them. With odds of 1, the mean
+/// zero of three or four recordings is named as an offset with probability 0.67 and 0.75 on arms without an offset; with 0.01, an offset of four
+/// times the scatter of three recordings is doubtful.
 const SHARED: f64 = 0.1;
 
 /// Encoder zeros of recordings, and the normal distribution that they were drawn from.
 #[derive(Debug, Clone)]
 pub struct EncoderZeros<const N: usize> {
-    /// Name, zero and its standard deviation of each recording; a zero is what an encoder shows where the model's position is zero, rad or m.
+    /// Name of each recording, and its encoder zeros with their standard deviations: what an encoder shows where the model's position is zero, rad or
+    /// m.
     pub recordings: Vec<RecordingZero<N>>,
     /// Standard deviation of each joint's zero between recordings, rad or m.
     pub spread: [f64; N],
-    /// Mean of the zeros over all training recordings beyond their scatter, rad or m; not corrected for.
+    /// Mean of each joint's zeros over the training recordings where it stands out of their scatter, else 0, rad or m; predictions do not contain it.
     common: SVector<f64, N>,
 }
 
@@ -44,7 +48,7 @@ pub struct RecordingZero<const N: usize> {
     pub sigma: SVector<f64, N>,
 }
 
-/// Likelihood of one recording's encoder zeros: curvature and, at zero displacement, slope of the log-likelihood.
+/// Likelihood of one recording's encoder zeros: curvature of the negative log-likelihood, and slope of the log-likelihood at zeros of 0.
 #[derive(Debug, Clone)]
 struct Evidence<const N: usize> {
     source: String,
@@ -53,7 +57,7 @@ struct Evidence<const N: usize> {
 }
 
 impl<const N: usize> EncoderZeros<N> {
-    /// Encoder zeros that do not differ between recordings.
+    /// Encoder zeros of 0 in all recordings.
     pub fn none() -> Self {
         Self { recordings: Vec::new(), spread: [0.0; N], common: SVector::zeros() }
     }
@@ -63,7 +67,8 @@ impl<const N: usize> EncoderZeros<N> {
         self.recordings.iter().find(|r| r.source == source).map_or_else(SVector::zeros, |r| r.zero)
     }
 
-    /// Offsets of a dataset's windows: initial states as measured, counted from these encoder zeros.
+    /// Initial-state offset of every window of a dataset: the encoder zeros of the window's recording, and initial positions and velocities as
+    /// measured.
     pub fn offsets(&self, data: &Dataset<N>) -> Vec<InitialStateOffset<N>> {
         let of_track: Vec<SVector<f64, N>> = data.tracks.iter().map(|track| self.of(&track.source)).collect();
         let offset =
@@ -71,19 +76,21 @@ impl<const N: usize> EncoderZeros<N> {
         data.windows.iter().map(|window| offset(window.track)).collect()
     }
 
-    /// Whether a dataset has logs of more than one recording, so that encoder zeros can be told from a shared offset.
+    /// Whether a dataset has logs of more than one recording, so that encoder zeros that differ can be distinguished from an offset that all share.
     pub fn can_be_told_from(data: &Dataset<N>) -> bool {
         data.tracks.iter().any(|track| track.source != data.tracks[0].source)
     }
 
-    /// Whether the zeros of all recordings of a dataset are known.
+    /// Whether an encoder zero has been estimated for every recording of a dataset.
     pub fn knows_all(&self, data: &Dataset<N>) -> bool {
         data.tracks.iter().all(|track| self.recordings.iter().any(|r| r.source == track.source))
     }
 
-    /// Encoder zeros of the training recordings, and their distribution, from the inner products `gram` of the zeros' columns around these zeros.
+    /// Encoder zeros of the training recordings, and their distribution over recordings, from the inner products `gram` of the derivatives of the
+    /// predictions by the zeros, taken at the zeros of `self`.
     ///
-    /// A mean of the zeros that does not stand out of their scatter is part of the scatter; a mean that does is left to the candidates.
+    /// A mean of the zeros that does not stand out of their scatter counts as part of the scatter; a larger mean is left for the candidates to
+    /// explain.
     pub(crate) fn of_training(&self, data: &Dataset<N>, gram: &Gram) -> Self {
         let evidence = self.evidence(data, gram);
         let around_mean = Self::distribution(&evidence, [true; N]);
@@ -93,7 +100,8 @@ impl<const N: usize> EncoderZeros<N> {
         if has_mean == [true; N] { around_mean } else { Self::distribution(&evidence, has_mean) }
     }
 
-    /// Distribution of zeros over recordings, and each recording's zero, by expectation maximisation; with a mean at the joints of `has_mean`.
+    /// Distribution of encoder zeros over recordings, and each recording's zero, by expectation maximisation. The mean of the distribution is
+    /// estimated at the joints marked in `has_mean` and zero at the others.
     fn distribution(evidence: &[Evidence<N>], has_mean: [bool; N]) -> Self {
         let mut found = Self { spread: [LARGEST_SPREAD; N], ..Self::none() };
         for _ in 0..ROUNDS {
@@ -113,7 +121,8 @@ impl<const N: usize> EncoderZeros<N> {
         found
     }
 
-    /// The known encoder zeros, and estimates of the zeros of the dataset's further recordings, with the known zeros' distribution as prior.
+    /// The first `known` encoder zeros, and estimates of the zeros of the dataset's other recordings, with the distribution of the known zeros as
+    /// prior.
     pub(crate) fn and_of_others(&self, data: &Dataset<N>, gram: &Gram, known: usize) -> Self {
         let mut found = self.clone();
         found.recordings.truncate(known);
@@ -127,8 +136,9 @@ impl<const N: usize> EncoderZeros<N> {
         found
     }
 
-    /// Odds that the recordings' zeros of joint `j` have a mean, `shared` beside these zeros, rather than mean zero: `SHARED` times the likelihood
-    /// ratio by the Bayesian information criterion of a normal sample (Schwarz 1978; Student's t test). `None` where recordings do not differ.
+    /// Odds that the encoder zeros of joint `j`, with `shared`, rad or m, added to each, have a non-zero mean rather than mean zero: `SHARED` times
+    /// the likelihood ratio by the Bayesian information criterion of a normal sample (Schwarz 1978; Student's t test). `None` where recordings do not
+    /// differ.
     pub fn odds_of_shared(&self, j: usize, shared: f64) -> Option<f64> {
         let n = self.recordings.len() as f64;
         if n < 2.0 || self.spread[j] <= 0.0 {
@@ -141,7 +151,8 @@ impl<const N: usize> EncoderZeros<N> {
         Some(SHARED * (1.0 + mean * mean / variance).powf(0.5 * n) / n.sqrt())
     }
 
-    /// Likelihood of each recording's encoder zeros, from the inner products of their columns over the recording's windows.
+    /// Likelihood of each recording's encoder zeros, from the inner products `gram` of the derivatives of the predictions by the zeros, summed over
+    /// the recording's windows.
     fn evidence(&self, data: &Dataset<N>, gram: &Gram) -> Vec<Evidence<N>> {
         let mut found: Vec<Evidence<N>> = Vec::new();
         let joints: Vec<usize> = (0..N).collect();

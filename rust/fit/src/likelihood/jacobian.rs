@@ -5,7 +5,8 @@ use crate::likelihood::weighting::Gram;
 use crate::model::hypothesis::Hypothesis;
 use armgap_core::arm::Arm;
 
-/// Part of a Jacobian column left independent by the other columns below which it is collinear, so that no columns are reused.
+/// Part of a Jacobian column's squared length that is independent of the other columns, below which the column counts as collinear and no columns of
+/// a neighbouring point are reused.
 const APART: f64 = 0.05;
 
 /// Jacobian columns of the free values, the first ones possibly reused from a neighbouring point, and their inner products.
@@ -84,7 +85,7 @@ impl<'a> Jacobian<'a> {
     }
 }
 
-/// A hypothesis with its whitened residual and its cost.
+/// A point of a fit: a hypothesis with its whitened residual, the cost of every window, their weighted sum and the prior cost.
 pub(crate) struct Linearisation<const P: usize> {
     pub(crate) hypothesis: Hypothesis<P>,
     pub(crate) residual: Vec<f64>,

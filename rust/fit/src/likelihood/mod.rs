@@ -3,7 +3,7 @@
 //! * `context`: arm, prior, scales, training and holdout windows; re-weighting until the scales are those of the residual.
 //! * `covariance`: covariance of fitted values by the jackknife over windows.
 //! * `dispersion`: dispersion factor between fits to different motions.
-//! * `holdout`: cost of a fit on the holdout, compared with noise and with the motion.
+//! * `holdout`: cost of a fit on the holdout, compared with the cost of noise alone and of predicting no motion.
 //! * `jacobian`: Jacobian of the predictions, with columns reused between neighbouring points.
 //! * `scale`: typical sizes of quantities on an arm and its logs.
 //! * `solve`: damped Gauss-Newton over the arm's parameters and effects together.

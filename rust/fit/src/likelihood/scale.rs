@@ -22,22 +22,24 @@ pub struct Scales<const N: usize> {
     pub inertia: [f64; N],
     /// Median sample period, s.
     pub period: f64,
-    /// Length of the last link, m; 1 where unknown.
+    /// Length of the last link, m; 0.3 where unknown.
     pub length: f64,
-    /// Acceleration of gravity, m/s^2.
+    /// Size of the acceleration of gravity, m/s^2; at least 1.
     pub gravity: f64,
 }
 
-/// Largest value of a parameter in a fit relative to its typical size; larger values are those of no arm.
+/// Largest deviation of an effect's parameter from its centre in a fit, relative to the parameter's typical size; no arm has larger values.
 const LARGEST: f64 = 50.0;
 
 /// Longest admissible time constant of an effect, in sample periods.
 const LONGEST_TIME: f64 = 1000.0;
 
-/// Ratio of the stiffness of the hardest joint limit to that of a soft one, which the joint's torque deflects by a share of the travel.
+/// Ratio of the stiffness of the hardest joint limit to that of a soft one, which the joint's RMS torque deflects by the RMS deviation of its
+/// position; also the ratio of their dampings.
 const HARDEST: f64 = 1e4;
 
-/// Largest characteristic speed of a speed-dependent effect, relative to the joint's RMS speed; beyond, it resembles another effect.
+/// Largest characteristic speed of a speed-dependent effect in a fit, relative to the joint's RMS speed; with a larger one the effect resembles
+/// another effect.
 const FASTEST: f64 = 2.5;
 
 /// Natural frequency of a typical elastic joint, 1/s.
@@ -50,7 +52,8 @@ const SHAFT_DAMPING: f64 = 0.2;
 const MOTOR_SHARE: f64 = 0.1;
 
 impl<const N: usize> Scales<N> {
-    /// Typical sizes from the logs `tracks` of an arm with parameters `theta`.
+    /// Typical sizes from the logs `tracks` of an arm with parameters `theta`, acceleration of gravity `gravity`, m/s^2, and length `length` of the
+    /// last link, m.
     pub fn new<A: Arm<f64, N, P>, const P: usize>(
         arm: &A,
         theta: &[f64; P],
@@ -114,7 +117,8 @@ impl<const N: usize> Scales<N> {
         0.5 * (from + to)
     }
 
-    /// Initial guess of a parameter of joint `j`, from `value` in units of its typical size; `None` for a position outside the joint's travel.
+    /// Initial guess of a parameter on joint `j`, SI, from `value` in units of the parameter's typical size; `None` for a position on a side of zero
+    /// that the joint never reaches.
     pub fn initial_guess(&self, quantity: Quantity, j: usize, value: f64) -> Option<f64> {
         match quantity {
             Quantity::Ratio => Some(value),
@@ -127,7 +131,7 @@ impl<const N: usize> Scales<N> {
         }
     }
 
-    /// Value from which a parameter's size is counted: its neutral value, or zero without one; for a rest position the middle of the travel.
+    /// Value from which a parameter's size is counted: its neutral value, or zero if it has none; for a rest position the middle of the travel.
     pub fn centre(&self, parameter: &EffectParameter, j: usize) -> f64 {
         match parameter.quantity {
             Quantity::Rest => self.middle(j),

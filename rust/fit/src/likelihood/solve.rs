@@ -14,7 +14,8 @@ use armgap_core::arm::Arm;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-/// Displacement of a value for sensitivities, relative to its size; events are located to 1e-12, so a forward difference is good to 1e-6.
+/// Displacement of a free value for derivatives by forward differences, relative to the value's typical size; events in rollouts are located to
+/// 1e-12, so a forward difference is good to 1e-6.
 const RELATIVE_STEP: f64 = 1e-6;
 
 /// Largest error of the predicted decrease of the cost, relative to the decrease that ends a search, at which the Jacobian is reused.
@@ -23,7 +24,8 @@ const FORESEEN: f64 = 0.5;
 /// Decrease of the cost predicted by a reused Jacobian, relative to the decrease that ends a search, below which the search ends.
 const LEAST: f64 = 0.1;
 
-/// Largest error of the predicted decrease of the cost, relative to the decrease, at which columns reused from a neighbour are reused again.
+/// Largest error of the predicted decrease of the cost, relative to the predicted decrease, at which Jacobian columns of a neighbouring hypothesis
+/// are reused again.
 const SERVES: f64 = 0.25;
 
 /// Effort of a search for the minimum of the cost: limits of iterations and convergence.
@@ -62,7 +64,7 @@ impl<const P: usize> Prior<P> {
     }
 }
 
-/// Data of a fit with the weights of their residuals and the prior.
+/// Data of a fit, weighting of its residuals and prior of its parameters.
 pub struct FitProblem<'a, A, const N: usize, const P: usize> {
     /// Model of the arm (dynamics without effects).
     pub arm: &'a A,
@@ -80,7 +82,7 @@ pub struct FitProblem<'a, A, const N: usize, const P: usize> {
     pub progress: &'a ProgressReporter,
 }
 
-/// Result of a fit: best hypothesis, its cost and the covariance of its values.
+/// Result of a fit: hypothesis of lowest cost, its cost and the covariance of its values.
 #[derive(Debug, Clone)]
 pub struct Fit<const P: usize> {
     /// Hypothesis of lowest cost found.
@@ -191,8 +193,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> FitProblem<'_, A, N, P> 
         self.solve_reusing(initial_guess, effort, &[])
     }
 
-    /// Minimises the cost from `initial_guess`, reusing a neighbour's Jacobian columns `known` for the first values as long as the cost falls as
-    /// these columns predict.
+    /// Minimises the cost from `initial_guess`, reusing the Jacobian columns `known` of a neighbouring hypothesis for the first values as long as the
+    /// cost falls as these columns predict.
     pub fn solve_reusing(&self, initial_guess: &Hypothesis<P>, effort: Effort, known: &[Vec<f64>]) -> Fit<P> {
         let (lower, upper) = self.bounds(initial_guess);
         let mut at = Linearisation::new(self, initial_guess.clone());
@@ -289,8 +291,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> FitProblem<'_, A, N, P> 
     }
 }
 
-/// Limits the values from index `free` on to nine tenths of their way to the lower bound in one step: an effect that is switched off has no
-/// derivative to return by.
+/// Values `next` after a step from the values `now`; those from index `free` on move by at most nine tenths of the distance to their lower bound,
+/// because an effect whose amplitude reaches zero has zero derivatives and could not return.
 fn inside(now: &[f64], mut next: Vec<f64>, lower: &[f64], free: usize) -> Vec<f64> {
     for i in free..next.len() {
         if lower[i].is_finite() {
@@ -342,7 +344,7 @@ pub fn scaled_inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     Some(DMatrix::from_fn(k, k, |i, j| inverse[(i, j)] * scale[i] * scale[j]))
 }
 
-/// Inverse of a normal matrix over the values that change some prediction; zero rows for values that change none, such as those of a stop that
+/// Inverse of a normal matrix over the values that change some prediction; zero rows for values that change none, such as those of a joint limit that
 /// no window reaches.
 pub fn inverse_of_seen(normal: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let seen: Vec<usize> = (0..normal.nrows()).filter(|&i| normal[(i, i)] > 0.0).collect();

@@ -22,17 +22,18 @@ use rayon::prelude::*;
 /// Factor on the standard deviations of a measured initial state.
 const INITIAL_STATE_INFLATION: f64 = 2.0;
 
-/// Largest factor on the standard deviation of a measured initial state: a local cubic errs by more where the acceleration jumps, so the deviation is
-/// raised to the offset that the fit required.
+/// Largest factor on the standard deviation of a measured initial state. The standard deviation is raised to the offset of the initial state that the
+/// fit required, because a local cubic errs by more than its covariance says where the acceleration jumps.
 const LARGEST_INFLATION: f64 = 20.0;
 
-/// Cost of a window relative to a typical one at which its robust weight is about one half.
+/// Parameter of the robust weight `(1 + TAIL) / (TAIL + c)` of a window, with `c` the window's cost relative to the median cost: about one half where
+/// `c` is of the size of `TAIL`.
 const TAIL: f64 = 3.0;
 
-/// Displacement of an initial state for sensitivities, in m or rad and per second.
+/// Displacement of an initial position, rad or m, or velocity, rad/s or m/s, for derivatives by forward differences.
 const INITIAL_STATE_STEP: f64 = 1e-6;
 
-/// Projection of one window's residual off the errors of its initial state.
+/// Projection of one window's residual that removes, to first order, what errors of the initial state contribute.
 #[derive(Debug, Clone)]
 struct Projection {
     /// Rows of the orthonormal basis `Q` that belong to samples.
@@ -64,8 +65,8 @@ impl Projection {
         (squares(&[residual])[0] + self.prior_residual.norm_squared() - coordinates).max(0.0)
     }
 
-    /// Inner products, in one window, of each of the first `lead` columns and of the residual with every column and last the residual, row by row;
-    /// then the squares of the columns after the first `lead`.
+    /// Inner products in one window, with its initial state projected out: of each of the first `lead` columns, and last the residual, with all
+    /// columns and last the residual, row by row; then the squared lengths of the columns after the first `lead`.
     fn products(&self, lead: usize, columns: &[&[f64]], residual: &[f64]) -> Vec<f64> {
         let all: Vec<&[f64]> = columns.iter().copied().chain([residual]).collect();
         let (k, basis) = (columns.len(), self.basis());
@@ -99,18 +100,18 @@ impl Projection {
 pub struct Weighting<const N: usize> {
     /// Standard deviation of each joint's residual, rad or m, by which residuals are divided.
     pub scale: [f64; N],
-    /// Offset of each window's initial state from the measured one, in the predictions.
+    /// Offset of each window's initial state from the measured state; predictions are made from the displaced state.
     pub offsets: Vec<InitialStateOffset<N>>,
-    /// Encoder zeros of the recordings that the predictions are made with.
+    /// Encoder zeros of the recordings with which the predictions are made.
     pub zeros: EncoderZeros<N>,
-    /// Robust weight of each window, 0 to 1; below one where the window's cost is far beyond the typical one.
+    /// Robust weight of each window: one where the window's cost is the median cost, towards zero far beyond, at most 4/3.
     pub robust_weight: Vec<f64>,
-    /// Cost of a typical window under the hypothesis for which the weighting was made.
+    /// Median cost of a window under the hypothesis for which the weighting was made.
     pub typical: f64,
     projections: Vec<Projection>,
 }
 
-/// Inner products of columns under the weighting, with the residual as last column.
+/// Inner products of whitened Jacobian columns, and last the whitened residual, with initial states projected out and windows weighted robustly.
 #[derive(Debug, Clone, Default)]
 pub struct Gram {
     /// Matrix of inner products, summed over windows.
@@ -132,7 +133,8 @@ impl Gram {
         Self { total, scores, robust_weight: vec![1.0; products.len()], products }
     }
 
-    /// Inner products, in one window, of the columns with indices `of`, each in its `unit`; requires the products of all columns.
+    /// Inner products in one window of the columns with indices `of`, column `of[a]` multiplied by `unit[a]`, times the window's robust weight;
+    /// requires the products of all columns.
     pub fn within(&self, window: usize, of: &[usize], unit: &[f64]) -> DMatrix<f64> {
         let columns = self.total.nrows();
         let (products, robust_weight) = (&self.products[window], self.robust_weight[window]);
@@ -143,7 +145,8 @@ impl Gram {
 }
 
 impl<const N: usize> Weighting<N> {
-    /// Weighting around a hypothesis with the predictions `predicted`, from initial states displaced by `offsets`.
+    /// Weighting of residuals with initial states projected out to first order around the predictions `predicted` of a hypothesis, from initial
+    /// states displaced by `offsets`; `scale` is the standard deviation of each joint's residual, rad or m.
     pub fn new<A: Arm<f64, N, P>, const P: usize>(
         data: &Dataset<N>,
         arm: &A,
@@ -156,7 +159,7 @@ impl<const N: usize> Weighting<N> {
         Self::from_sensitivities(data, &sensitivities, scale, offsets)
     }
 
-    /// Weighting from the derivatives of the predictions by initial positions and velocities.
+    /// Weighting, with all robust weights one, from the derivatives `sensitivities` of the predictions by initial positions and velocities.
     pub fn from_sensitivities(
         data: &Dataset<N>,
         sensitivities: &[Vec<f64>],
@@ -173,8 +176,8 @@ impl<const N: usize> Weighting<N> {
         Self { scale, offsets, zeros: EncoderZeros::none(), robust_weight, typical: 1.0, projections }
     }
 
-    /// Whitened derivatives of the predicted encoder positions by the encoder zeros, from those by the initial positions: the arm starts displaced by
-    /// minus the zero, and all shown positions are displaced by the zero.
+    /// Whitened derivatives of the predicted encoder positions by the encoder zeros, from the derivatives `sensitivities` by initial positions and
+    /// velocities: a zero displaces the initial position by its negative, and then all predicted encoder positions by itself.
     pub fn zero_columns(&self, sensitivities: &[Vec<f64>]) -> Vec<Vec<f64>> {
         let column = |j: usize| {
             let mut column: Vec<f64> = sensitivities[j].iter().map(|s| -s).collect();
@@ -185,12 +188,12 @@ impl<const N: usize> Weighting<N> {
         (0..N).map(column).collect()
     }
 
-    /// The weighting with the encoder zeros from which its offsets count.
+    /// The weighting with the encoder zeros `zeros`, with which its predictions were made.
     pub fn with_zeros(self, zeros: EncoderZeros<N>) -> Self {
         Self { zeros, ..self }
     }
 
-    /// The weighting with robust weights of the windows by their costs under a hypothesis with this residual.
+    /// The weighting with robust weights of the windows, from their costs for the whitened residual `residual`.
     pub fn robust(mut self, data: &Dataset<N>, residual: &[f64]) -> Self {
         let costs = self.costs(data, residual);
         self.typical = crate::log::track::median(costs.clone()).max(f64::MIN_POSITIVE);
@@ -198,8 +201,8 @@ impl<const N: usize> Weighting<N> {
         self
     }
 
-    /// Student-t cost of a window with plain cost `cost`: negative log-likelihood of a multivariate Student variable, linear for typical windows and
-    /// logarithmic far beyond.
+    /// Student-t cost of a window with the cost `cost` without robust weight: negative log-likelihood of a multivariate Student variable, linear for
+    /// typical windows and logarithmic far beyond.
     pub fn student_t_cost(&self, cost: f64) -> f64 {
         self.typical * (1.0 + TAIL) * (cost / (TAIL * self.typical)).ln_1p()
     }
@@ -294,7 +297,7 @@ impl<const N: usize> Weighting<N> {
         left
     }
 
-    /// Offsets of all initial states that fit a whitened residual best.
+    /// Offsets of all initial states, from the measured states, that minimise the cost of a whitened residual.
     pub fn refit_initial_states(&self, data: &Dataset<N>, residual: &[f64]) -> Vec<InitialStateOffset<N>> {
         let windows = data.windows.iter().zip(&self.projections).zip(&self.offsets);
         windows
@@ -346,7 +349,8 @@ pub fn initial_state_sensitivities<A: Arm<f64, N, P>, const N: usize, const P: u
         .collect()
 }
 
-/// Projection of one window from the sensitivities to its initial state, the joints' scales and the covariance of the measured state.
+/// Projection of one window's residual, from its sensitivities `columns` to the initial state, the joints' scales and the covariance of the measured
+/// state.
 fn projection<const N: usize>(
     columns: &[&[f64]],
     scale: &[f64; N],

@@ -86,12 +86,12 @@ pub struct Dependence {
     pub law: DependenceLaw,
 }
 
-/// Torque as a table over one variable, beside the mean residual torque and earlier tables of the joint.
+/// Torque on a joint as a table over one variable of the motion, to be added to the mean torque and to the joint's earlier tables.
 #[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct DependenceLaw {
     /// Mean of the variable in each class, ascending, in the variable's SI unit.
     pub x: Vec<f64>,
-    /// Torque in each class of the variable, beside `constant`, N m or N.
+    /// Torque in each class of the variable less the mean torque `constant`, N m or N.
     pub torque: Vec<f64>,
     /// Standard deviation of the torque in each class, from the scatter over blocks of one second, N m or N.
     pub sigma: Vec<f64>,

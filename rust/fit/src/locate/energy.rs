@@ -1,9 +1,9 @@
 //! Energy balance of the residual torque.
 //!
-//! Power is torque times velocity. Friction that a model leaves out only takes energy from the joint; a spring, an inertia or a tilt
-//! takes energy and gives it back; a motor that delivers more than its command supplies energy. So the work of the residual torque, relative to
-//! all the energy it exchanges, tells kinds of causes apart before any is named. Noise in the residual torque takes and gives energy at
-//! random: it reduces the size of the balance and keeps its sign.
+//! Power is torque times velocity. Friction that a model leaves out only takes energy from the joint; a spring, an inertia or a tilt takes energy and
+//! gives it back; a motor that delivers more than its command supplies energy. So the work of the residual torque, relative to all energy that this
+//! torque exchanges, distinguishes kinds of causes before any cause is named. Noise in the residual torque takes and gives energy at random: noise
+//! reduces the size of the balance but does not change its sign.
 
 use crate::locate::regimes::{ResidualTorque, ResidualTorques};
 use schemars::JsonSchema;

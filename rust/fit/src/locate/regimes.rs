@@ -1,7 +1,7 @@
 //! Where the gap lies: residual torque of each joint over the regimes of its motion.
 //!
-//! The prediction of a window and its measurement run under one logged torque, so their difference is smooth; its second derivative
-//! is the residual acceleration, and `M(q)` times the residual acceleration is the residual torque.
+//! The prediction of a window and its measurement have the same logged torque as input, so their difference is smooth; its second derivative is the
+//! residual acceleration, and `M(q)` times the residual acceleration is the residual torque.
 
 use crate::log::track::Track;
 use crate::model::hypothesis::Hypothesis;
@@ -19,10 +19,10 @@ const HALF_WIDTH: usize = 8;
 /// Time from a sign change of a joint's velocity within which the joint counts as near a reversal, s.
 const REVERSAL_S: f64 = 0.05;
 
-/// Bins of a variable over which residual torques are averaged.
+/// Number of bins of a variable over which residual torques are averaged.
 const BINS: usize = 6;
 
-/// Mean square residual torque of a regime, relative to the joint's, from which the regime stands out.
+/// Ratio of the mean square residual torque in a regime to that of the joint over all samples from which the regime stands out.
 const STANDS_OUT: f64 = 1.6;
 
 /// State and residual torque of all joints at one sample.
@@ -95,7 +95,8 @@ fn velocity(t: &[f64], q: impl Fn(usize) -> f64, k: usize) -> f64 {
     local_cubic(t, q, k, 6).dq
 }
 
-/// Whether the sign of a joint's mean velocity differs before and after sample `k`, over the reversal time on either side.
+/// Whether the sign of a joint's mean velocity differs before and after sample `k`, over `REVERSAL_S` seconds on either side; `q` gives the joint's
+/// position at a sample.
 fn reverses(t: &[f64], q: impl Fn(usize) -> f64, k: usize) -> bool {
     let near = |x: f64| t.partition_point(|&s| s < x).min(t.len() - 1);
     let (a, b) = (near(t[k] - REVERSAL_S), near(t[k] + REVERSAL_S));
@@ -155,7 +156,7 @@ pub struct VariableRange {
     pub to: f64,
 }
 
-/// Variable of the motion over which residual torques are binned.
+/// Variable of the motion over which residual torques are binned, with names of the lowest, the middle and the highest bins.
 struct RegimeVariable<const N: usize> {
     name: String,
     unit: &'static str,

@@ -1,11 +1,11 @@
 //! Dependences of the residual torque that no effect explains: tables over one variable of the motion.
 //!
 //! For every joint the residual torque by inverse dynamics is regressed on one variable of the motion at a time, as a table over classes of equal
-//! count (the regressogram of Tukey 1961), beside the arm's own parameters: missing torques have shifted them, and the residual torque of a fitted
-//! model is what they leave. Residual torque, regressor and classes go through one low-pass, so that neither noise of the acceleration nor a lag
-//! enters only one of them. Tables are added one after another (forward selection). A table counts if it predicts logs that it was not fitted to:
-//! each log in turn is left out, and its residual under the table of the remaining logs is compared with its residual under the parameters alone. The
-//! scatter of the gain over blocks of one second says whether chance would do as well.
+//! count (the regressogram of Tukey 1961), together with the arm's own parameters, because a torque that the model leaves out has biased their fitted
+//! values. Residual torque, regressor and classes pass the same low-pass filter, so that neither noise of the acceleration nor a lag affects only one
+//! of them. Tables are added one after another (forward selection). A table counts if it predicts logs that it was not fitted to: each log in turn is
+//! left out, and its residual under the table of the remaining logs is compared with its residual under the parameters alone. The scatter of the gain
+//! over blocks of one second shows whether the gain may be due to chance.
 
 use crate::locate::dependence::{Dependence, DependenceLaw, MotionVariable};
 use crate::locate::variable_classes::{CLASSES, Classes};
@@ -18,10 +18,11 @@ use crate::predict::residual_torque::{
 use armgap_core::arm::Arm;
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
-/// Standard deviation of the low-pass of residual torques, s: cut-off 7 Hz, above arms' motion and below most noise of encoders' second differences.
+/// Standard deviation in time of the Gaussian low-pass filter of residual torques, s: cut-off 7 Hz, above arms' motion and below most noise of
+/// encoders' second differences.
 const LOW_PASS_S: f64 = 0.02;
 
-/// Spacing of the points at which residual torques are regressed, s: about the low-pass's standard deviation.
+/// Spacing in time of the points at which residual torques are regressed, s: about the standard deviation of the low-pass filter.
 const GRID_S: f64 = 0.02;
 
 /// Share of the time around a point at which a joint may be at rest, with undetermined friction, from which the point is left out of the regression.
@@ -30,19 +31,22 @@ const AT_REST: f64 = 0.1;
 /// Length of the blocks over which gains in prediction are taken as independent, s: residual torques are correlated over 0.05 to 0.3 s.
 const BLOCK_S: f64 = 1.0;
 
-/// Number of points that count as one independent point, for their errors are correlated by the low-pass and by the residual torque itself.
+/// Number of points that count as one independent point, because their errors are correlated by the low-pass filter and by the residual torque
+/// itself.
 const CORRELATED: f64 = 10.0;
 
-/// Least gain of a table in predicting left-out logs, in its standard deviations. By chance a table predicts worse than none.
+/// Least decrease of the squared residual torque of left-out logs by a table, in standard deviations of this decrease. Where the torque does not
+/// depend on the variable, a table predicts left-out logs worse than no table.
 const CERTAIN: f64 = 2.0;
 
 /// Least share of the residual torque's variance beyond noise that a table must explain.
 const MATTERS: f64 = 0.15;
 
-/// Largest number of tables listed for one joint. None is listed where the residual torque is at most twice what the noise of positions makes.
+/// Largest number of tables for one joint. No table is fitted where the mean square of the residual torque is at most twice what noise of the
+/// positions contributes.
 pub const MOST: usize = 3;
 
-/// Least number of blocks of logs in which tables are judged.
+/// Least number of blocks of one second in all logs for tables to be fitted.
 const FEWEST_BLOCKS: usize = 6;
 
 /// Residual torque of one log under a model by inverse dynamics, sample by sample.
@@ -55,7 +59,7 @@ pub struct LogResidual<const N: usize> {
     noise: [f64; N],
     /// Speeds below which a joint may be at rest, rad/s or m/s.
     slow: [f64; N],
-    /// Whether tables are fitted to the log; all logs serve to judge which tables there are.
+    /// Whether the torques of the tables are fitted to this log; all logs serve to judge which tables there are.
     teaches: bool,
 }
 
@@ -94,11 +98,12 @@ struct Rest {
     torque: Vec<f64>,
     /// Sum of squares, over all points, of the residual torque due to noise of the positions.
     noise: f64,
-    /// Columns of the regression at each point: torque of each of the arm's parameters per standard deviation of the arm file, and a constant one.
+    /// Regressor row at each point without tables: torque on the joint, N m or N, due to one standard deviation (arm file) of each of the arm's
+    /// parameters, and last the constant 1.
     base: Vec<Vec<f64>>,
     /// Index of the log that each point belongs to.
     log: Vec<usize>,
-    /// Whether tables are fitted to each log.
+    /// Whether the torques of the tables are fitted to each log.
     teaches: Vec<bool>,
     /// Index of the block of one second that each point belongs to, counted through all logs.
     block: Vec<usize>,
@@ -193,7 +198,7 @@ impl Rest {
             matrix.ger(1.0, &row, &row, 1.0);
             right.axpy(*y, &row, 1.0);
         }
-        // Parameters are known as well as the arm file says; a class counts as if one point more had shown no torque there.
+        // The prior of the parameters is the arm file's; a class counts as if it had one further point, with zero torque.
         let variance = self.torque.iter().map(|y| y * y).sum::<f64>() / self.torque.len().max(1) as f64;
         let precision = (0..k).map(|i| if i < own - 1 { CORRELATED * variance } else { 1.0 });
         Regression {
@@ -241,7 +246,8 @@ impl Rest {
     }
 }
 
-/// Torque of all joints per unit of the arm's parameter `i`; the sign in Coulomb friction is smoothed around rest.
+/// Torque of all joints per unit of the arm's parameter `i` in a motion `[q, dq, ddq]`; the sign in Coulomb friction is smoothed below the speeds
+/// `slow`, rad/s or m/s.
 fn column<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     arm: &A,
     [q, dq, ddq]: &[SVector<f64, N>; 3],
@@ -263,7 +269,7 @@ struct Regression<'a> {
     ridge: DMatrix<f64>,
 }
 
-/// Regressor row of a point: torques of the parameters, one, and the share of every class of each table's variable.
+/// Regressor row of a point: the row `base` without tables, then the share of every class of each table's variable around the point.
 fn row(base: &[f64], laws: &[&Classes], point: usize) -> DVector<f64> {
     let shares = laws.iter().flat_map(|law| law.share[point]);
     DVector::from_iterator(base.len() + CLASSES * laws.len(), base.iter().copied().chain(shares))
@@ -289,7 +295,8 @@ impl Regression<'_> {
         self.rest.torque[point] - self.row(point).dot(values)
     }
 
-    /// Residual torque of each point after the regression fitted to the other logs; `None` where they determine nothing.
+    /// Residual torque of each point after subtraction of the regression fitted to all logs but the point's own, N m or N; `None` if such a fit is
+    /// singular.
     fn left_out(&self) -> Option<Vec<f64>> {
         let values: Vec<DVector<f64>> = (0..self.rest.logs())
             .map(|log| {
@@ -300,8 +307,8 @@ impl Regression<'_> {
         Some((0..self.rest.torque.len()).map(|i| self.left(&values[self.rest.log[i]], i)).collect())
     }
 
-    /// Last table of the regression, fitted to the logs meant for it: torque by class, and standard deviation from the scatter of the blocks' scores
-    /// (sandwich estimate).
+    /// Last table of the regression, fitted to the logs with `teaches`: torque by class, and standard deviation from the scatter of the blocks'
+    /// scores (sandwich estimate).
     fn last_law(&self) -> Option<DependenceLaw> {
         let teaches = &self.rest.teaches;
         let (matrix, right) = self.system(|log| teaches[log]);
@@ -324,7 +331,7 @@ impl Regression<'_> {
         let constant = mean + values[self.rest.base.first()?.len() - 1];
         let mut law = DependenceLaw { x: Vec::new(), torque: Vec::new(), sigma: Vec::new(), constant };
         for (c, x) in last.mean.iter().enumerate().filter_map(|(c, x)| Some((c, (*x)?))) {
-            // Of the difference from the mean, as the torque is one.
+            // Standard deviation of the class's torque less the mean over the classes, as `law.torque` is such a difference.
             let apart = DVector::from_fn(CLASSES, |i, _| f64::from(u8::from(i == c)) - weight[i] / all);
             let own = covariance.view((first, first), (CLASSES, CLASSES));
             law.x.push(x);

@@ -5,7 +5,8 @@ use crate::locate::unnamed::LogResidual;
 use crate::numeric::low_pass::LowPass;
 use crate::predict::residual_torque::InverseDynamicsResidual;
 
-/// Classes of a variable: a torque with two periods over the travel is resolved, and each class holds some hundred samples of a log of ten seconds.
+/// Number of classes of a variable: a torque with two periods over the travel is resolved, and each class holds some hundred samples of a log of ten
+/// seconds.
 pub const CLASSES: usize = 16;
 
 /// Variable of the motion cut into classes of equal count.
@@ -15,13 +16,12 @@ pub struct Classes {
     pub variable: MotionVariable,
     /// Mean of the variable in each class, in its SI unit; `None` for an empty class.
     pub mean: [Option<f64>; CLASSES],
-    /// Share of the weights of the residual torque's low-pass filter, around each sample that is kept, that lies on samples of each class of the
-    /// variable.
+    /// For each point that is kept, the share of the low-pass filter's weights around the point that falls on samples in each class of the variable.
     pub share: Vec<[f64; CLASSES]>,
 }
 
 impl Classes {
-    /// Classes of a variable over all logs, and their shares around the points `kept` of each log.
+    /// Classes of a variable over all logs, and their shares around the points `kept` of each log, for the low-pass filters `lows` of the logs.
     pub fn new<const N: usize>(
         variable: MotionVariable,
         logs: &[LogResidual<N>],

@@ -1,18 +1,18 @@
 //! Cuts logs into windows at states that are measured well.
 //!
-//! A window is predicted from its measured initial state. At a reversal the acceleration jumps by twice the Coulomb friction; a local cubic cannot
-//! follow the jump, and its velocity errs by many times its standard deviation. One such initial state caused up to nine tenths of the error of a
-//! perfect model. So windows begin and end beside reversals, not on them; the motion between the edges is predicted in either case.
+//! A window is predicted from its measured initial state. At a reversal the acceleration jumps by twice the Coulomb friction over the inertia; a
+//! local cubic cannot follow the jump, and its velocity errs by many times its standard deviation. One such initial state caused up to nine tenths of
+//! the error of a perfect model. So the edges of windows are moved away from reversals; the motion between two edges is predicted in either case.
 
 use crate::log::track::{Smoothed, Track, median};
 
-/// Largest shift of a window's edge, relative to the window's length. With 0.4 floors hardly fall further and windows differ by more than a factor of
-/// two.
+/// Largest shift of a window's edge, relative to the window's length. With 0.4 noise floors are hardly lower, and the lengths of windows differ by
+/// more than a factor of two.
 const REACH: f64 = 0.2;
 
-/// Squared error of a velocity that is measured at a reversal, in units of the variance of a typical one: errors of some ten standard deviations were
-/// seen. The value only has to exceed the differences between the variances of samples to which a window's edge may be shifted; other values were not
-/// tried.
+/// Squared error of a velocity that is measured at a reversal, in units of the variance of a typical velocity: errors of some ten standard deviations
+/// were seen. The value only has to exceed the differences between the variances of samples to which a window's edge may be shifted; other values
+/// were not tried.
 const REVERSAL: f64 = 100.0;
 
 /// Index pairs `(first, last)` of consecutive windows of about `horizon` seconds, each edge shifted to the nearby sample with the smallest error of
@@ -46,8 +46,9 @@ pub fn cut_at_smooth_motion<const N: usize>(track: &Track<N>, horizon: f64) -> V
     found
 }
 
-/// Expected squared error of the velocities at every sample, in units of a typical variance, summed over the joints. No sample counts as better than
-/// typical: a cubic wider than its neighbours' is so by chance, and errs by more than its variance says.
+/// Expected squared error of the velocities at every sample, in units of the median variance of each joint, summed over the joints. No sample counts
+/// as better than the median: where a local cubic is wider than at neighbouring samples, it is so by chance, and its velocity errs by more than its
+/// variance says.
 fn velocity_errors<const N: usize>(smoothed: &[[Smoothed; N]]) -> Vec<f64> {
     let distances: [Vec<f64>; N] = std::array::from_fn(|j| to_reversal(smoothed, j));
     let typical: [f64; N] =

@@ -1,35 +1,36 @@
 //! Standard deviation of a position measurement, for any motion of the arm and for samples held over several rows.
 //!
-//! The part of seven samples that no quintic explains is `e = sum_i w_i q_i / |w|` with the weights of the sixth divided difference,
-//! `w_i = 1 / prod_{k != i} (t_i - t_k)`. For white noise its standard deviation is that of the noise (variance estimation by
-//! differences: Hall, Kay and Titterington, Biometrika 77, 1990); its median size over a log is insensitive to exceptional places.
+//! The part of seven samples that no quintic explains is `e = sum_i w_i q_i / |w|` with the weights of the sixth divided difference, `w_i = 1 /
+//! prod_{k != i} (t_i - t_k)`. For white noise the standard deviation of `e` is that of the noise (variance estimation by differences: Hall, Kay and
+//! Titterington, Biometrika 77, 1990); the median size of `e` over a log is insensitive to outliers.
 //!
-//! White noise gives one value from successive samples and from every second or fifth sample. Motion adds to the value of wide strides;
-//! positions held over `h` rows add to every stride except multiples of `h`, and not to the rows at which they change. Additions only
-//! make the value larger: where one of these series gives a clearly smaller value than successive samples, the smallest is the noise.
+//! White noise gives the same estimate from successive samples and from every second or fifth sample. Motion raises the estimate at wide strides;
+//! positions held over `h` rows raise the estimate at every stride except multiples of `h`, but not that from the rows at which the position changes.
+//! So errors only raise estimates: where one of these series of samples gives a clearly smaller estimate than successive samples, the smallest
+//! estimate is the noise.
 
 use crate::log::track::median;
 
-/// Samples of one divided difference: as many as leave one degree of freedom beside a quintic.
+/// Number of samples in one divided difference: a quintic fitted to so many leaves one degree of freedom.
 const TAKEN: usize = 7;
 
-/// Strides, in rows, between the samples of a divided difference; held positions are held over 2 to 6 rows.
+/// Strides, in rows, between the samples of a divided difference: logs hold positions over up to 6 rows.
 const STRIDES: [usize; 6] = [1, 2, 3, 4, 5, 6];
 
-/// Ratio of two noise estimates, another series of samples over successive samples, below which the former is clearly smaller: six estimates of one
-/// noise, each from a few hundred places, differ by less.
+/// Ratio of the noise estimate from another series of samples to that from successive samples, below which the former is clearly smaller: six
+/// estimates of one noise, each from a few hundred places in a log, differ by less.
 const CLEARLY: f64 = 0.75;
 
 /// Largest number of samples of a log around which its noise is estimated: the estimate is then good to three percent.
 const PLACES: usize = 4000;
 
-/// Least number of rows with a changed value for these rows to be used as a series of their own.
+/// Least number of rows at which the position changes for these rows to be a series of samples of their own.
 const FRESH: usize = 50;
 
 /// Median of a chi-squared variable with one degree of freedom, whose mean is one.
 const CHI_SQUARED_MEDIAN: f64 = 0.454_936;
 
-/// Smallest standard deviation of a position, rad or m, from which a weight is derived.
+/// Lower bound of the estimated standard deviation of a position measurement, rad or m, so that weights of residuals stay finite.
 const LEAST: f64 = 1e-9;
 
 /// Noise of a position measurement.
@@ -37,7 +38,7 @@ const LEAST: f64 = 1e-9;
 pub struct Noise {
     /// Standard deviation of the position measurement, rad or m.
     pub sigma: f64,
-    /// Whether successive samples show clearly more noise than others, as positions held over several rows do.
+    /// Whether successive samples show clearly more noise than another series of samples, as positions held over several rows do.
     pub is_held: bool,
 }
 

@@ -15,10 +15,12 @@ const HALF_WIDTHS: [usize; 8] = [3, 4, 6, 8, 11, 15, 20, 27];
 /// Half width, in standard deviations, of the confidence intervals that successive widths of a local cubic must share.
 const CONFIDENCE: f64 = 2.0;
 
-/// Smallest mean square error of a measured state, in units of its variance: an estimate from one window is no better known.
+/// Lower bound of the estimated mean square error of a measured state, in units of its variance: an estimate from the samples of one local cubic is
+/// too uncertain to show less.
 const LEAST_ERROR: f64 = 0.25;
 
-/// Largest mean square error of a measured state, in units of its variance: above, the positions are not those of the arm.
+/// Upper bound of the estimated mean square error of a measured state, in units of its variance: with larger errors the positions are not those of
+/// the arm.
 const LARGEST_ERROR: f64 = 10.0;
 
 /// Number of samples of the widest local cubic.
@@ -44,7 +46,7 @@ pub struct Track<const N: usize> {
     pub noise: [f64; N],
     /// Whether the joint's position samples are held over several rows, per joint.
     pub is_held: [bool; N],
-    /// Smallest step of the position measurement, per joint, rad or m; zero where none is seen.
+    /// Smallest step of the position measurement, per joint, rad or m; zero where the positions show no step.
     pub step: [f64; N],
     /// Known external disturbances that act in the log.
     pub pushes: Vec<EffectInstance>,
@@ -52,8 +54,8 @@ pub struct Track<const N: usize> {
     pub tables: Vec<Vec<f64>>,
     /// Reference of a position controller, for a log that holds references instead of torques.
     pub reference: Option<Reference<N>>,
-    /// Acceleration by which the torque drives each joint from sample to sample, `M(q)^-1 tau`; `None` for a joint whose measured motion is no
-    /// smoother without it.
+    /// Acceleration of each joint due to the torque, `M(q)^-1 tau`, rad/s^2 or m/s^2, from sample to sample; `None` for a joint whose measured motion
+    /// is no smoother when the motion due to the torque is subtracted.
     driven: [Option<Vec<f64>>; N],
     /// Median sample period, s, computed at first use.
     period: OnceLock<f64>,
@@ -160,12 +162,12 @@ impl<const N: usize> Track<N> {
         self
     }
 
-    /// Makes local cubics describe the measured motion minus the motion due to the torque.
+    /// Subtracts the motion due to the torque from the measured motion before local cubics are fitted to it.
     ///
-    /// A torque that jumps from sample to sample, as that of a controller with a noisy velocity does, allows cubics through a few samples only.
-    /// The motion due to the torque over some samples follows from the inertia `M(q)` alone; the rest, due to friction, gravity and what
-    /// the model lacks, is smooth. Where the arm is not driven in this way (a wrong sign or unit, a motor behind a spring) the motion is no
-    /// smoother without the torque's part, and is taken as measured.
+    /// A torque that jumps from sample to sample, as that of a controller with a noisy velocity does, allows cubics through a few samples only. The
+    /// motion due to the torque over some samples follows from the inertia `M(q)` alone; the rest, due to friction, gravity and effects that the
+    /// model leaves out, is smooth. Where the arm is not driven in this way (a wrong sign or unit, a motor behind a spring), subtraction makes the
+    /// motion no smoother, and the motion is taken as measured.
     pub fn smoothed_beside_torque<A: Arm<f64, N, P>, const P: usize>(
         mut self,
         arm: &A,
@@ -190,7 +192,8 @@ impl<const N: usize> Track<N> {
         self
     }
 
-    /// Mean logarithm of the variance of a joint's velocities by local cubics: low where cubics are wide.
+    /// Sum over some samples of the logarithm of the variance of a joint's velocity by a local cubic: low where cubics are wide; `driven` is the
+    /// acceleration due to the torque whose motion is subtracted, rad/s^2 or m/s^2.
     fn roughness(&self, j: usize, driven: Option<&[f64]>) -> f64 {
         (0..self.len()).step_by(ASKED).map(|k| self.widest(j, k, driven).local.covariance[2].ln()).sum()
     }
@@ -224,7 +227,7 @@ impl<const N: usize> Track<N> {
     /// One track of pieces that follow each other in time; `None` for no pieces.
     pub fn joined(pieces: &[&Self]) -> Option<Self> {
         let (first, rest) = pieces.split_first()?;
-        // A joint is taken beside its torque only where all pieces are.
+        // The motion due to the torque is subtracted at a joint only if it was subtracted in all pieces.
         let driven = std::array::from_fn(|j| {
             pieces
                 .iter()
@@ -309,10 +312,10 @@ impl<const N: usize> Track<N> {
 
     /// Local cubic of joint `j` around sample `at`, with a width adapted to the motion.
     ///
-    /// The width grows while the confidence intervals of the velocities have a point in common; a jump of the acceleration nearby ends the
-    /// growth early, smooth motion late (intersection of confidence intervals, Goldenshluger and Nemirovski 1997). The widest cubic that passes
-    /// may still err by several of its standard deviations, unseen by its neighbours; the next narrower one errs by a third of
-    /// this and has the larger standard deviation, so its error agrees with its covariance.
+    /// The width grows while the confidence intervals of the velocities have a point in common; a jump of the acceleration nearby ends the growth
+    /// early, smooth motion late (intersection of confidence intervals, Goldenshluger and Nemirovski 1997). The widest cubic that passes may still
+    /// err by several of its standard deviations without contradicting narrower ones; the next narrower one errs by a third of this and has the
+    /// larger standard deviation, so its error agrees with its covariance.
     pub fn local(&self, j: usize, at: usize) -> Local {
         self.nested(j, at).local
     }
@@ -322,7 +325,8 @@ impl<const N: usize> Track<N> {
         self.widest(j, at, self.driven[j].as_deref())
     }
 
-    /// Widest local cubic but one that is consistent with all narrower ones, after subtraction of the motion due to the accelerations `driven`.
+    /// Local cubic of joint `j` around sample `at`, the widest but one that is consistent with all narrower ones, after subtraction of the motion due
+    /// to the accelerations `driven`.
     fn widest(&self, j: usize, at: usize, driven: Option<&[f64]>) -> Smoothed {
         let (first, positions) = self.positions_near(j, at, driven);
         let fit = |half: usize| (local_cubic(&self.t, |k| positions[k - first], at, half), half);
@@ -341,8 +345,8 @@ impl<const N: usize> Track<N> {
         Smoothed { local: before.0, wider: widest.0, half_width: before.1 }
     }
 
-    /// Mean square errors of a local cubic's position and velocity in units of their variance: raised where its residuals exceed the noise because
-    /// no cubic describes the motion, and by its distance from the sample and from a wider cubic.
+    /// Mean square errors of a local cubic's position and velocity in units of their variance: raised where the cubic's residuals exceed the noise
+    /// because no cubic describes the motion, and by the distance of the cubic from the sample and from a wider cubic.
     ///
     /// Where positions are held over several rows, the residuals of a cubic say nothing about the motion.
     fn mean_square(&self, j: usize, at: usize, smoothed: &Smoothed) -> [f64; 2] {

@@ -1,4 +1,4 @@
-//! Velocities from positions, for estimation schemes that need them at the samples.
+//! Velocities from positions, for estimation schemes that need velocities at the samples.
 
 use crate::numeric::smooth::local_cubic;
 
@@ -14,7 +14,7 @@ pub enum Velocity {
 }
 
 impl Velocity {
-    /// Velocity method with this name; `None` for an unknown name.
+    /// Method with the name `name`; `None` for an unknown name.
     pub fn from_name(name: &str) -> Option<Self> {
         match name {
             "backward" => Some(Self::Backward),

@@ -1,4 +1,4 @@
-//! Choice of the arm type known at compile time from a description at run time.
+//! Selection of the arm type, which is known at compile time, from a description of an arm at run time.
 
 use armgap_core::arm::{Arm, ArmKind, Axis, Pendulum, TwoLink};
 use armgap_core::transmission::Sides;
@@ -67,7 +67,7 @@ impl ArmDescription {
         self.counts_per_rev.as_ref().map(|counts| counts.iter().map(|count| whole / count).collect())
     }
 
-    /// Sides of joint `j`'s transmission that encoder and friction may be on, both on one side first.
+    /// Sides of joint `j`'s transmission that encoder and friction may be on, those with both on one side first.
     pub fn sides(&self, j: usize) -> Vec<Sides> {
         let known =
             |list: &Option<Vec<Option<bool>>>| list.as_ref().and_then(|l| l.get(j).copied().flatten());
@@ -81,14 +81,14 @@ impl ArmDescription {
         let all = [false, true].into_iter().flat_map(|rotor_rides| {
             [Sides::LINK, Sides::MOTOR, mixed(true), mixed(false)].map(|s| Sides { rotor_rides, ..s })
         });
-        // On the first joint there is nothing to ride on.
+        // The first joint has no preceding link on which its rotor could ride.
         all.filter(|s| if j == 0 { !s.rotor_rides } else { rides.is_none_or(|r| r == s.rotor_rides) })
             .filter(|s| encoder.is_none_or(|e| e == s.encoder_at_motor))
             .filter(|s| friction.is_none_or(|f| f == s.friction_at_motor))
             .collect()
     }
 
-    /// Runs `work` with the arm type of this kind; `None` if the number of parameters does not fit the kind.
+    /// Runs `work` with the arm type of the description's kind; `None` if the number of parameters does not fit the kind.
     pub fn dispatch<W: WithArm>(&self, work: W) -> Option<W::Output> {
         let gravity = self.gravity;
         let first_length = self.link_length.as_ref().and_then(|l| l.first().copied());

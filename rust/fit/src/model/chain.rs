@@ -1,4 +1,4 @@
-//! Choice of the chain type of one to seven joints known at compile time from a description at run time; chain dynamics row by row.
+//! Selection of the chain type of one to seven joints, which is known at compile time, from a description at run time; chain dynamics row by row.
 
 use crate::model::arm::WithArm;
 use armgap_core::chain::{
@@ -50,8 +50,8 @@ impl ChainDescription {
         by_size!(self.joints.len(), call)
     }
 
-    /// Runs `work` with the chain as an arm with these parameters, 13 per joint; `None` if their number does not fit, or unless it has
-    /// one to [`armgap_core::chain::MAX_JOINTS`] joints.
+    /// Runs `work` with the chain as an arm with the parameters `theta`, 13 per joint; `None` if the number of parameters does not fit, or unless the
+    /// chain has one to [`armgap_core::chain::MAX_JOINTS`] joints.
     pub fn dispatch_arm<W: WithArm>(&self, theta: &[f64], work: W) -> Option<W::Output> {
         macro_rules! call {
             ($n:literal) => {{
@@ -97,7 +97,7 @@ pub enum Quantity {
     MomentumRegressor,
     /// Regressor of `g - dK/dq` over the links' parameters, with `K` the kinetic energy, `(n, 10 n)`.
     PotentialRegressor,
-    /// Regressor of the energy above rest at `q = 0` over the links' parameters, `(10 n,)`.
+    /// Regressor of the total energy, above that of the arm at rest at `q = 0`, over the links' parameters, `(10 n,)`.
     EnergyRegressor,
     /// Kinetic energy with rotors, J, one number.
     KineticEnergy,
@@ -177,7 +177,7 @@ impl<const N: usize> Model<N> {
 }
 
 impl Quantity {
-    /// Writes the quantity of a chain in the state `[q, dq, input]` to `out`.
+    /// Writes the quantity of a chain in the state `[q, dq, input]` to `out`, row by row; `input` as in [`ChainRows`].
     fn write<const N: usize>(
         self,
         chain: &Chain<f64, N>,

@@ -1,8 +1,8 @@
 //! Custom effects: a torque per unit of size, given by the user at every sample of every log.
 //!
-//! A function of time, position, velocity and torque evaluated along the *measured* motion is a torque on the joint; its size
-//! is fitted and ranked like that of any effect. Within a window the predicted motion stays close to the measured one, so
-//! evaluation along the measured motion rather than the prediction causes an error of second order.
+//! A function of time, position, velocity and torque evaluated along the *measured* motion is a torque on the joint; the size of this torque is
+//! fitted and ranked like that of any effect. Within a window the predicted motion stays close to the measured one, so evaluation along the measured
+//! motion rather than the prediction causes an error of second order.
 
 use armgap_core::effect::{
     Effect, EffectParameter, Hooks, InputSegment, MAX_PARAMETERS, Quantity, Scope, Spec, Trial,
@@ -59,7 +59,7 @@ pub fn law(index: usize) -> &'static dyn Effect<f64> {
     &LAWS[index]
 }
 
-/// Index of an effect among the custom effects, if it is one.
+/// Index of an effect among those whose torques are tables; `None` for any other effect.
 fn index(law: &dyn Effect<f64>) -> Option<usize> {
     SPECS.iter().position(|spec| std::ptr::eq(spec, law.spec()))
 }

@@ -101,7 +101,7 @@ impl<const P: usize> Hypothesis<P> {
         self.rounding.iter().any(|width| *width > 0.0)
     }
 
-    /// The hypothesis with friction regularised over these widths, rad/s (m/s) per joint.
+    /// The hypothesis with friction regularised over the widths `widths`, rad/s (m/s) per joint.
     pub fn rounded_over<const N: usize>(&self, widths: [f64; N]) -> Self {
         let mut other = self.clone();
         for (slot, width) in other.rounding.iter_mut().zip(widths) {
@@ -149,8 +149,8 @@ impl<const P: usize> Hypothesis<P> {
         })
     }
 
-    /// Torques that reach the joints under the held commands of a log; `pushes` are added last, `tables` hold the torques of the
-    /// custom effects.
+    /// Torques that reach the joints when effects act on the commanded torques `held` of a log; the disturbances `pushes` act last, `tables` hold the
+    /// torques of the custom effects; `None` if no effect acts on commands.
     pub fn command<const N: usize>(
         &self,
         t: &[f64],
@@ -173,7 +173,7 @@ impl<const P: usize> Hypothesis<P> {
         Some(torque)
     }
 
-    /// State of the joints, given the positions and velocities that their encoders show.
+    /// Positions and velocities of the joints, given the positions `q`, rad or m, and velocities `dq` that their encoders show.
     pub fn initial_state<const N: usize>(&self, q: SVector<f64, N>, dq: SVector<f64, N>) -> State<f64, N> {
         if !self.distorts() {
             return State::new(q, dq);

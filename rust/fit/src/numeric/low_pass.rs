@@ -8,7 +8,7 @@ pub struct LowPass {
     pub grid: Vec<f64>,
     /// Spacing of the grid, s.
     pub step: f64,
-    /// For every grid point, the index of the first sample within reach and the weights of the samples from it on.
+    /// For every grid point, the index of the first sample within four standard deviations, and the weights of the samples from that one on.
     pub kernels: Vec<(usize, Vec<f64>)>,
 }
 
@@ -28,7 +28,8 @@ impl LowPass {
     }
 }
 
-/// Weights of the samples around the instant `at`, from the first within reach; each sample weighs in proportion to its time interval.
+/// Index of the first sample within four standard deviations of the instant `at`, and weights of the samples from that one on; each sample weighs in
+/// proportion to its time interval.
 fn kernel(t: &[f64], at: f64, step: f64, width: f64) -> (usize, Vec<f64>) {
     let reach = 4.0 * width;
     let (a, b) = (t.partition_point(|&t| t < at - reach), t.partition_point(|&t| t <= at + reach));

@@ -14,7 +14,7 @@ impl<F: Fn(f64) -> f64> CostFunction for Function<F> {
     }
 }
 
-/// Argument between `low` and `high` at which `f` is smallest, after at most this many evaluations.
+/// Argument between `low` and `high` at which `f` is smallest, after at most `evaluations` iterations.
 pub fn minimum(f: impl Fn(f64) -> f64, [low, high]: [f64; 2], evaluations: u64) -> Option<f64> {
     let found = Executor::new(Function(f), BrentOpt::new(low, high))
         .configure(|state| state.max_iters(evaluations))

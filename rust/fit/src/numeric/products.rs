@@ -2,10 +2,10 @@
 
 use armgap_core::cpu::{Cpu, Kernel, Level};
 
-/// Entries of a vector in inner products.
+/// Number of entries of the vectors in which inner products are summed.
 const LANES: usize = 8;
 
-/// Columns processed in one pass of an inner product: their sums are independent and need not wait for each other.
+/// Number of columns processed in one pass of an inner product: their sums are independent, so no sum waits for another.
 const COLUMNS_AT_ONCE: usize = 4;
 
 /// Inner products `x . y` of one column `x` with `K` columns `y` of equal length.
@@ -28,8 +28,8 @@ fn dots<C: Cpu, const K: usize>(x: &[f64], y: [&[f64]; K]) -> [f64; K] {
     })
 }
 
-/// Sum of all lanes of a vector. Not inlined, and given a copy: inlined, compilers arrange the lanes in pairs to suit the sum, at a cost in every
-/// step before; given a reference, they may keep the lanes in memory all along.
+/// Sum of all lanes of a vector. The function is not inlined, because compilers would then arrange the lanes in pairs for this sum and slow down
+/// every step before it; the argument is a copy, because with a reference compilers may keep the lanes in memory throughout.
 #[inline(never)]
 fn total(sums: [f64; LANES]) -> f64 {
     ((sums[0] + sums[4]) + (sums[1] + sums[5])) + ((sums[2] + sums[6]) + (sums[3] + sums[7]))

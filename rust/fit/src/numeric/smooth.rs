@@ -19,7 +19,7 @@ pub struct Local {
     pub misfit: f64,
 }
 
-/// Ratio of a sample interval to the mean one from which it is a gap in the log, over which no local cubic reaches.
+/// Ratio of a sample interval to the mean interval from which it is a gap in the log, over which no local cubic reaches.
 pub const HOLE: f64 = 10.0;
 
 /// Index of the first sample and number of samples of a local cubic of half width `half` around `at`: `half` on either side; at an end of the log
@@ -38,7 +38,7 @@ pub fn local_cubic(t: &[f64], q: impl Fn(usize) -> f64, at: usize, half: usize) 
     let (first, count) = samples_near(t, at, half);
     let scale = (t[first + count - 1] - t[first]).max(f64::MIN_POSITIVE) / 2.0;
     let place = |k: usize| (t[k] - t[at]) / scale;
-    // The normal matrix of powers holds their sums only.
+    // The entries of the normal matrix are sums of powers of the times.
     let (mut powers, mut right) = ([0.0; 7], Vector4::zeros());
     let base = q(at);
     for k in first..first + count {

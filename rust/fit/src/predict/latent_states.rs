@@ -1,7 +1,7 @@
 //! Latent states, which no encoder measures, at the start of every window: simulated along the measured motion from the start of the log.
 //!
-//! The hysteresis state of a joint depends on its path, and a motor behind a shaft or backlash moves under the logged torque against the
-//! measured position of its link; neither requires an initial guess.
+//! The hysteresis state of a joint depends on its path, and a motor behind a shaft or backlash moves under the logged torque against the measured
+//! position of its link; so neither needs an initial guess at a window's start.
 
 use crate::log::track::{MeasuredState, Track};
 use crate::predict::window::MAX_SUBSTEPS_FRICTION;
@@ -14,14 +14,15 @@ use armgap_core::transmission::{LatentState, Sides, Transmission};
 /// Largest product of a motor's natural frequency, rad/s, and step length in the simulation of latent states.
 const STEP: f64 = 1.0;
 
-/// Time constant with which a link behind its motor's encoder is drawn to the deflection by the motor's torque balance, s: long beside a sample, as
-/// accelerations are noisy, short beside the ringing of a shaft with little damping, which would carry an error along the log.
+/// Time constant with which the simulated deflection of a joint with its encoder on the motor is corrected to that from the motor's torque balance,
+/// s: long compared with a sample interval, as accelerations are noisy, short compared with the ringing of a shaft with little damping, which would
+/// carry an error along the log.
 const MEMORY: f64 = 0.25;
 
 /// Largest number of steps per sample in the simulation of latent states.
 const MAX_STEPS: usize = 8;
 
-/// Largest latent position or rate [SI]; beyond, the hypothesis is wrong and the value is cut, as its cost will show.
+/// Largest latent position or rate [SI]; larger values are set to it: the hypothesis is wrong then, and its cost will be large.
 const LIMIT: f64 = 1e3;
 
 /// Latent states of a plant at every sample of a track up to sample `last`, under the commanded torques `torque`.
@@ -131,7 +132,7 @@ fn beside_measured<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     all
 }
 
-/// Measured motion of one motor over one sample interval.
+/// Measured motion of the motor of joint `j` over one sample interval of `h` seconds: the states at its ends, by the encoder on the motor.
 struct Motor<'a, const N: usize> {
     path: [&'a MeasuredState<N>; 2],
     h: f64,
@@ -164,7 +165,7 @@ impl<const N: usize> Motor<'_, N> {
     }
 }
 
-/// Latent states with rigid backlash flanks: a rotor beyond a flank is put onto it.
+/// Latent states with rigid backlash flanks: a rotor beyond a flank is moved onto the flank.
 fn rigid<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     state: &LatentState<f64, N>,
     plant: &Plant<f64, A, N, P>,
@@ -210,26 +211,26 @@ impl MotorMotion<'_> {
         (torque - self.transmission.transmitted(at - q, rate - dq)) / self.transmission.inertia
     }
 
-    /// Acceleration, at the fraction `s` of the sample interval, of a motor at rest at zero on a shaft without backlash.
+    /// Acceleration, at the fraction `s` of the sample interval, of a motor at rest at position zero on a shaft without backlash.
     fn push(&self, s: f64) -> f64 {
         let (q, dq) = self.link(s);
         (self.torque.at(s) + self.transmission.stiffness * q + self.transmission.damping * dq)
             / self.transmission.inertia
     }
 
-    /// Position and velocity of the motor at the end of the sample interval, from `e` and `v` at its start.
+    /// Position and velocity of the motor at the end of the sample interval, from its position `e` and velocity `v` at the start of the interval.
     fn advance(&self, e: f64, v: f64) -> (f64, f64) {
         if self.transmission.backlash > 0.0 {
             return self.steps((e, v), |s| self.drawn(s), |here, e, v| self.slope(here, e, v));
         }
-        // Without backlash everything is linear.
+        // Without backlash the motor's equation of motion is linear.
         let Transmission { stiffness, damping, inertia, .. } = self.transmission;
         let (pull, brake) = (stiffness / inertia, damping / inertia);
         self.steps((e, v), |s| self.push(s), |push, e, v| push - pull * e - brake * v)
     }
 
-    /// Position and velocity of the motor at the end of the sample interval by Runge-Kutta, given its input `drawn` at a fraction of the interval and
-    /// its acceleration `slope` under an input.
+    /// Position and velocity of the motor at the end of the sample interval by Runge-Kutta, from position `e` and velocity `v`; `drawn` gives the
+    /// motor's input at a fraction of the interval, and `slope` its acceleration under an input.
     #[inline(always)]
     fn steps<D>(
         &self,

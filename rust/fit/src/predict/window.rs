@@ -17,10 +17,12 @@ use armgap_core::transmission::LatentState;
 use nalgebra::SVector;
 use rayon::prelude::*;
 
-/// Size of a predicted position [rad or m] beyond which it has diverged; it is cut there so that its cost stays finite.
+/// Size of a predicted position [rad or m] beyond which the rollout has diverged; the predictions from there on have this value, so that the cost
+/// stays finite.
 pub(crate) const DIVERGED: f64 = 1e3;
 
-/// Largest number of sub-steps per sample for joints whose regularised friction stops them near standstill. Widths that need more are not tried.
+/// Largest number of sub-steps per sample for joints whose regularised friction stops them near standstill. Widths of the regularisation that need
+/// more are not tried.
 pub(crate) const MAX_SUBSTEPS_FRICTION: usize = 16;
 
 /// Largest number of sub-steps per sample for motors that oscillate against their links; a stiffer hypothesis is rejected by its cost.
@@ -146,7 +148,7 @@ impl<const N: usize> Dataset<N> {
         self.predict_by::<SideBySide, A, P>(arm, hypothesis, offsets)
     }
 
-    /// Predicted positions of all windows, one rollout at a time: for arms whose long equation of motion gains nothing from vector lanes.
+    /// Predicted positions of all windows, rad or m, one rollout at a time: for arms whose long equation of motion gains nothing from vector lanes.
     pub fn predict_singly<A: Arm<f64, N, P>, const P: usize>(
         &self,
         arm: &A,
@@ -155,7 +157,7 @@ impl<const N: usize> Dataset<N> {
         self.predict_by::<Singly, A, P>(arm, hypothesis, &self.zero_offsets())
     }
 
-    /// Predicted positions of all windows, simulated in the way `R`.
+    /// Predicted positions of all windows, rad or m, with the rollouts simulated by the method `R`.
     fn predict_by<R: Rollouts, A: Arm<f64, N, P>, const P: usize>(
         &self,
         arm: &A,
@@ -219,7 +221,7 @@ impl<const N: usize> Dataset<N> {
         predicted
     }
 
-    /// Whether a joint comes close to a position of discontinuous torque within a window.
+    /// Whether a joint comes close to a position at which its torque jumps, such as a joint limit, in the measured motion of a window.
     fn is_near_edge<A: Arm<f64, N, P>, const P: usize>(
         &self,
         window: &Window<N>,
@@ -273,7 +275,7 @@ impl<const N: usize> InitialStateOffset<N> {
 /// Distance beyond a window's measured travel, relative to this travel, within which a prediction may reach a discontinuity of the torque.
 const NEAR_EDGE: f64 = 0.3;
 
-/// How rollouts of many windows are simulated.
+/// Method of simulating the rollouts of many windows.
 trait Rollouts {
     /// Simulates rollouts of a plant in which nothing but friction modes changes ([`Plant::is_plain`]).
     fn plain<A: Arm<f64, N, P>, const N: usize, const P: usize>(runs: &mut [Run<'_, f64, A, N, P>]);
@@ -312,10 +314,11 @@ impl Rollouts for Singly {
     }
 }
 
-/// Rollouts simulated as one group over vector lanes: enough that few lanes are idle at the end.
+/// Number of rollouts simulated as one group over vector lanes: enough that few lanes are idle at the end.
 const GROUP: usize = 4 * WIDTH;
 
-/// Adds latent states to a state whose positions are those that the encoders show: a link behind its motor's encoder is displaced by the deflection.
+/// Adds latent states to a state whose positions are those that the encoders show: where the encoder is on the motor, the deflection is subtracted
+/// from the shown position to give that of the link.
 fn enter<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     plant: &Plant<f64, A, N, P>,
     state: &mut State<f64, N>,
