@@ -17,7 +17,7 @@ const AROUND: f64 = 0.25;
 /// Longest duration of a fitted push, s.
 const LONGEST: f64 = 2.5;
 
-/// Least share of the windows' cost that a push must remove to be kept where the model leaves errors unexplained.
+/// Least share of the cost of the windows that a push touches which the push must remove to be kept where the model leaves errors unexplained.
 const HELPS: f64 = 0.01;
 
 /// Least share of the windows' cost, with the model refitted to the recording, that a push must remove to be kept where the model leaves errors
@@ -48,10 +48,10 @@ const SETTLED: f64 = 1e-4;
 /// Durations, s, from which the fit of a push is started besides the duration seen in the residual torque.
 const LONGER: [f64; 2] = [0.04, 0.12];
 
-/// Rounds in which initial states and weights of the windows are recomputed around a fitted push.
+/// Number of rounds in which initial states and weights of the windows are recomputed with a fitted push in the model.
 const ROUNDS: usize = 2;
 
-/// Displacement along a principal axis of the model's covariance for sensitivities, in standard deviations.
+/// Displacement of the model's values along a principal axis of their covariance, for sensitivities by finite difference, in standard deviations.
 const AXIS_STEP: f64 = 0.01;
 
 /// Windows that a push touches, with the residual of their predictions under any values of the push.
@@ -120,7 +120,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             bare = touched.cost_under(self, own.bare(), &none).min(bare);
         }
         let seen = touched.cost(&touched.residual_of(&p));
-        // Beside a remainder a search from elsewhere would take the remainder for the push.
+        // Where the model leaves errors unexplained, a search from other durations would fit these errors instead of the push.
         let (mut fitted, left) = if state.remainder { touched.minimise(p) } else { touched.least(p) };
         let share = |left: f64| (bare - left) / (bare - usual.min(0.5 * bare)).max(1e-300);
         let believed = share(left) > EXPLAINS && bare - left > least;
@@ -153,8 +153,8 @@ fn least_gain<const N: usize, const P: usize>(sample: &WindowSet<N>, state: &Pus
     state.min_relevance.powi(2) * sample.motion(&state.scale)
 }
 
-/// Whether the fitted push (impulse, time, duration) agrees with the seen one in time and sign; where the model leaves errors unexplained
-/// (`remainder`) also in size, as the fit may have taken up part of these errors.
+/// Whether the fitted push (impulse, time, duration) agrees in time and sign with the one seen in the residual torque; where the model leaves errors
+/// unexplained (`remainder`) also in size, as the fit may have taken up part of these errors.
 fn close(fitted: &Vector3<f64>, seen: &Vector3<f64>, remainder: bool) -> bool {
     let ratio = fitted[0] / seen[0];
     let near = (fitted[1] - seen[1]).abs() < (MOVED * seen[2]).max(MOVED_LEAST);
@@ -180,7 +180,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Touched<'_, A, N, P> {
         self.weighting.residual(&self.sample.measured, &predicted)
     }
 
-    /// Cost of the windows under the model `own`, initial states fitted to it, and a push with impulse, time and duration `p`.
+    /// Cost of the windows under the model `own`, with initial states fitted to this model, and a push with impulse, time and duration `p`.
     fn cost_under(&self, context: &DiagnosisContext<A, N, P>, own: &Hypothesis<P>, p: &Vector3<f64>) -> f64 {
         let mut data = self.sample.data.clone();
         data.tracks[0].pushes = self.with(p);
@@ -192,6 +192,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Touched<'_, A, N, P> {
         there.weighting.costs(&there.sample.data, &residual).iter().sum()
     }
 
+    /// Cost of the windows with the whitened residual `r`, by robust weights.
     fn cost(&self, r: &[f64]) -> f64 {
         self.weighting.total(&self.weighting.costs(&self.sample.data, r))
     }

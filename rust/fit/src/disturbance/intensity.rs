@@ -50,6 +50,7 @@ struct PredictionError<const N: usize> {
 /// Prediction errors of all windows, whose likelihood is a function of the torque intensities.
 struct PredictionErrors<const N: usize> {
     windows: Vec<(KalmanFilter<N>, Vec<PredictionError<N>>)>,
+    /// Covariance of the noise of measured positions, rad^2 or m^2.
     noise: Matrix<N>,
     /// Common logarithms of the smallest intensities ([`FAINTEST`]).
     faintest: [f64; N],
@@ -57,7 +58,7 @@ struct PredictionErrors<const N: usize> {
 
 /// Each joint's share of the kinetic energy that residual torques feed into the arm over the holdout, under a hypothesis: `w_j (M^-1)_jj`.
 ///
-/// The metric is that of Gauss's principle of least constraint, in which torques of unlike joints compare; shares add to one.
+/// The metric is that of Gauss's principle of least constraint, in which torques of different joints can be compared; shares add to one.
 pub fn shares<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     context: &DiagnosisContext<A, N, P>,
     hypothesis: &Hypothesis<P>,
@@ -90,7 +91,8 @@ pub fn shares<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     std::array::from_fn(|j| if whole > 0.0 && whole.is_finite() { fed[j] / whole } else { 1.0 / N as f64 })
 }
 
-/// Common logarithm of the intensity of a torque of the size `part` times each joint's typical torque, drawn anew at every sample.
+/// Common logarithm, by joint, of the intensity, (N m)^2 s or N^2 s, of a torque of the size `part` times the joint's typical torque, drawn anew at
+/// every sample.
 fn intensities<const N: usize>(scales: &Scales<N>, part: f64) -> [f64; N] {
     scales.torque.map(|torque| ((part * torque).powi(2) * scales.period).max(1e-300).log10())
 }
@@ -142,11 +144,15 @@ impl<const N: usize> CostFunction for PredictionErrors<N> {
 /// Kalman filter of the prediction errors of positions and velocities: estimates and blocks of their covariance.
 #[derive(Clone)]
 struct KalmanFilter<const N: usize> {
+    /// Estimated prediction error of the positions, rad or m.
     e: Vector<N>,
+    /// Estimated prediction error of the velocities, rad/s or m/s.
     de: Vector<N>,
+    /// Covariance of position errors.
     position: Matrix<N>,
     /// Covariance of position errors (rows) and velocity errors (columns).
     mixed: Matrix<N>,
+    /// Covariance of velocity errors.
     velocity: Matrix<N>,
 }
 
@@ -180,7 +186,7 @@ impl<const N: usize> KalmanFilter<N> {
         self.mixed -= position * self.mixed;
         self.position -= position * self.position;
 
-        // A torque held over the step, of the variance that its intensity has there.
+        // A random torque held over the step of length `h`, with the variance `intensity / h`.
         let h = miss.step;
         self.e += self.de * h;
         self.position += (self.mixed + self.mixed.transpose()) * h + self.velocity * (h * h);

@@ -1,10 +1,10 @@
-//! Effects in the place of pushes: a saturated drive lacks torque at a few instants, and a joint that reaches a stop is driven back a few times;
-//! both look like pushes.
+//! Effects in the place of pushes: a saturated drive delivers too little torque at a few instants, and a joint that reaches a stop is driven back a
+//! few times; both look like pushes.
 //!
-//! A cause shows in the typical window; a torque limit or a stop that one log reaches once or twice does not, and training logs that do not reach
-//! it cannot locate it. So the pushes of a joint are compared with an effect that could have caused them, on equal terms: the model is fitted with
-//! either to all windows of all logs, both are judged by one Student-t likelihood, and both are penalised for their free values (Bayesian
-//! information criterion, Schwarz 1978). Each push has three values, an effect a fixed number however often it acts.
+//! The model search finds effects that act in typical windows; a torque limit or a stop that one log reaches once or twice is not found, and training
+//! logs that do not reach it cannot locate it. So the pushes of a joint are compared with an effect that could have caused them, on equal terms: the
+//! model is fitted with either to all windows of all logs, both are judged by one Student-t likelihood, and both are penalised for their free values
+//! (Bayesian information criterion, Schwarz 1978). Each push has three values, an effect a fixed number however often it acts.
 
 use super::push::Disturbance;
 use crate::likelihood::context::{DiagnosisContext, WindowSet};
@@ -21,7 +21,7 @@ use armgap_core::arm::Arm;
 use armgap_core::effect::{MAX_PARAMETERS, find};
 use rayon::prelude::*;
 
-/// Effects that act like pushes, each on one joint, with the initial guess from a push.
+/// Effects that act like pushes, each on one joint, with functions for their initial guess from a push and for the test of the fitted effect.
 const LAWS: [LawGuess; 2] = [
     LawGuess { name: "torque_saturation", from_push: limit_guess, acts_as_named: |_, _| true },
     LawGuess { name: "contact", from_push: stop_guess, acts_as_named: is_elastic },
@@ -30,16 +30,17 @@ const LAWS: [LawGuess; 2] = [
 /// Bisection steps that find the torque limit from one push.
 const HALVINGS: usize = 40;
 
-/// Rounds in which initial states and weights of the windows are recomputed around the model with an effect in the place of pushes.
+/// Number of rounds in which initial states and weights of the windows are recomputed around the model with an effect in the place of pushes.
 const ROUNDS: usize = 2;
 
-/// Ratio of duration, and of peak, of a contact's half sine of torque to the constant torque that fits it best.
+/// Ratio of duration, and of peak, of a contact's half-sine pulse of torque to the rectangular pulse of torque that fits it best.
 const HALF_SINE: f64 = 1.3;
 
-/// First guess of a stop's damping: damping torque at the push's mean speed relative to the mean torque.
+/// First guess of the damping of a stop (joint limit): damping torque at the push's mean speed relative to the mean torque.
 const DAMPED: f64 = 0.1;
 
-/// Least ratio of a stop's largest elastic torque to its largest damping torque: a free mass that meets a stop of the damping ratio `z` has `1 / (2 z)`.
+/// Least ratio of a stop's largest elastic torque to its largest damping torque: a free mass that meets a stop of the damping ratio `z` has `1 / (2
+/// z)`.
 const ELASTIC: f64 = 0.2;
 
 /// Effect of the library whose action can be mistaken for a push.
@@ -47,13 +48,13 @@ struct LawGuess {
     name: &'static str,
     /// Parameters of the effect that acts like the push at the push's time; `None` if the effect cannot.
     from_push: fn(&PushedMotion<'_>) -> Option<[f64; MAX_PARAMETERS]>,
-    /// Whether the effect with fitted parameters acts during the push as its name says.
+    /// Whether the effect with fitted parameters acts during the push as its name says (a contact: elastically).
     acts_as_named: fn(&[f64; MAX_PARAMETERS], &PushedMotion<'_>) -> bool,
 }
 
 /// Measured motion and commanded torque of a joint during a push.
 struct PushedMotion<'a> {
-    /// Impulse, time and duration of the push.
+    /// Impulse, N m s (N s), time of the centre, s, and duration, s, of the push.
     push: [f64; 3],
     /// Sample times, s, from about one duration of the push before its centre to one after.
     t: &'a [f64],
@@ -70,7 +71,7 @@ struct Trial {
     guesses: Vec<EffectInstance>,
     /// Pushes that the effect may replace.
     theirs: Vec<Disturbance>,
-    /// Pushes that stay beside the effect.
+    /// Pushes that stay in the logs together with the effect.
     others: Vec<Disturbance>,
 }
 
@@ -87,7 +88,8 @@ struct Explanation<const N: usize, const P: usize> {
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// The effect that explains the logs no worse, by the Bayesian information criterion, than the pushes on a joint do; `None` if there is none.
+    /// The effect on a joint that explains the logs no worse, by the Bayesian information criterion, than the pushes on this joint do; `None` if
+    /// there is none.
     pub(super) fn law_in_place(
         &mut self,
         alone: &Attribution<N, P>,
@@ -116,7 +118,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         best
     }
 
-    /// Trials of the effect `law` on a joint in the place of pushes that it could have caused; one trial per side of zero, as a stop has one side.
+    /// Trials of the effect `law` on a joint in the place of pushes that it could have caused; one trial per sign of the effect's first parameter, as
+    /// a stop has one side.
     fn trials(&self, joint: usize, law: &'static LawGuess, disturbances: &[Disturbance]) -> Vec<Trial> {
         let Some(effect) = find::<f64>(law.name) else { return Vec::new() };
         let guess = |e: &Disturbance| {
@@ -144,7 +147,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let all = self.of_all_windows();
         let model = &pushed.fit.hypothesis;
         let bare = all.explanation(pushed.fit.clone(), &pushed.weighting, 0).raw;
-        // Windows weigh as the pushes leave them: under a model with neither they would count as outliers.
+        // Window weights are those of the model with the pushes: without pushes and without the effect, the windows that pushes touch would count as
+        // outliers.
         let problem = all.problem(&pushed.weighting);
         let fitted: Vec<Fit<P>> =
             trial.guesses.par_iter().map(|guess| problem.solve(&model.with(*guess), Effort::ROUGH)).collect();
@@ -163,7 +167,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let free = |values: usize| values as f64 * windows.ln();
         let of_pushes: usize = trial.theirs.iter().map(|e| e.push.len()).sum();
         let saved = free(of_pushes) - free(effect.len());
-        // What a law explains elsewhere does not put it in the place of a push.
+        // A decrease of the cost in windows without a push is no reason to put the effect in the place of a push.
         let touched = self.touched(&trial.theirs);
         let there = |of: &Explanation<N, P>| touched.iter().map(|w| of.costs[*w]).sum::<f64>();
         let advantage = (pushed.cost - found.cost).min(there(pushed) - there(&found)) + saved;
@@ -258,8 +262,8 @@ fn limit_guess(motion: &PushedMotion<'_>) -> Option<[f64; MAX_PARAMETERS]> {
     Some([low, 0.0, 0.0])
 }
 
-/// First guess of a stop that a push towards zero could come from: entered when the push begins, left when it ends, with the stiffness that
-/// the greatest depth requires.
+/// First guess (position, stiffness, damping) of a stop that could have caused a push towards zero position: entered when the push begins, left when
+/// it ends, with the stiffness that the greatest depth requires.
 fn stop_guess(motion: &PushedMotion<'_>) -> Option<[f64; MAX_PARAMETERS]> {
     let [impulse, time, duration] = motion.push;
     let side = -impulse.signum();
@@ -279,7 +283,8 @@ fn stop_guess(motion: &PushedMotion<'_>) -> Option<[f64; MAX_PARAMETERS]> {
     Some([side * position, HALF_SINE * torque / depth, DAMPED * torque * half / depth])
 }
 
-/// Whether a stop's stiffness takes up a part of the motion beyond it: what only brakes a joint beyond a position is no stop.
+/// Whether a fitted stop acts elastically during a push: its largest elastic torque is a considerable part of its largest damping torque. An effect
+/// that only brakes a joint beyond a position is no stop.
 fn is_elastic(
     &[position, stiffness, damping, ..]: &[f64; MAX_PARAMETERS],
     motion: &PushedMotion<'_>,
@@ -336,7 +341,7 @@ mod tests {
                 let push = [impulse, TIME, lasts / HALF_SINE];
                 stop_guess(&PushedMotion { push, t: &t, q: &q, torque: &torque })
             };
-            // A unit mass: it leaves as fast as it came, and oscillates at the root of the stiffness.
+            // A unit mass leaves the stop as fast as it came, and oscillates at the square root of the stiffness.
             let [at, stiffness, damping] = found(-side * 2.0 * speed).unwrap();
             assert!((at / (side * position) - 1.0).abs() < 0.02, "{at}");
             assert!((stiffness / rate.powi(2) - 1.0).abs() < 0.2, "{stiffness}");

@@ -14,17 +14,18 @@ const MODEL_TIME: f64 = 0.25;
 /// Correlation time of the residual torque in the test of pushes, s.
 const JUDGED_TIME: f64 = 0.06;
 
-/// Least scatter, relative to the joint's typical torque, in the weights of the fit of model errors: the torque of a joint that is hardly driven
-/// could otherwise be explained by parameters of no consequence.
+/// Least standard deviation of the residual torque, relative to the joint's typical torque, in the weights of the fit of model errors: the torque of
+/// a joint that is hardly driven could otherwise be explained by parameters of no consequence.
 const MODEL_SCATTER: f64 = 0.05;
 
-/// Least part of a Gaussian pulse that the further columns must leave unexplained for it to be told from them.
+/// Least part of a Gaussian pulse, as a weighted square, that the other columns of the linear fit must leave unexplained for the pulse to be
+/// distinguished from them.
 const DISTINCT: f64 = 0.15;
 
-/// First guess of the residual torque's scatter, relative to the joint's typical torque.
+/// First guess of the residual torque's standard deviation, relative to the joint's typical torque.
 const FIRST_SCATTER: f64 = 0.15;
 
-/// Rounds in which the scatter of the residual torque is estimated again.
+/// Number of rounds in which the standard deviation of the residual torque is estimated again.
 const ROUNDS: usize = 4;
 
 /// Prior standard deviation of a push's height relative to the typical torque of its joint.
@@ -42,7 +43,7 @@ pub struct Fitted {
     weights: Vec<[Vec<f64>; 2]>,
 }
 
-/// Data of the linear fit of model errors and pulses, with the scatter that sets its weights.
+/// Data of the linear fit of model errors and pulses, with the standard deviations that set its weights.
 pub struct Linear<'a, const N: usize> {
     /// Residual torque of the log with the columns of possible model errors.
     pub residual: &'a Residual<N>,
@@ -53,7 +54,7 @@ pub struct Linear<'a, const N: usize> {
 }
 
 impl<'a, const N: usize> Linear<'a, N> {
-    /// A linear fit of the residual torque with the first guess of its scatter.
+    /// Data of a linear fit of the residual torque, with the first guess of the residual torque's standard deviation.
     pub fn new(residual: &'a Residual<N>) -> Self {
         let moving = |x: &Joint| x.rest.iter().map(|r| (1.0 - r).clamp(0.0, 1.0)).collect();
         let first = |x: &Joint| vec![FIRST_SCATTER * x.typical.max(1e-9); residual.t.len()];
@@ -64,7 +65,8 @@ impl<'a, const N: usize> Linear<'a, N> {
         }
     }
 
-    /// Fits all columns and the given pulses, and re-estimates the scatter from the residual.
+    /// Fits all columns of model errors and the given pulses, with the standard deviation of the residual torque re-estimated from what the fit
+    /// leaves.
     pub fn settle(&mut self, bells: &[Bell]) -> Option<Fitted> {
         let mut fitted = self.fit(bells)?;
         for _ in 0..ROUNDS {
@@ -75,6 +77,7 @@ impl<'a, const N: usize> Linear<'a, N> {
         Some(fitted)
     }
 
+    /// Weighted linear least-squares fit of all columns of model errors and of the given pulses, at the present weights; `None` if it is singular.
     pub fn fit(&self, bells: &[Bell]) -> Option<Fitted> {
         let residual = self.residual;
         let (c, k) = (residual.prior.len(), residual.prior.len() + bells.len());
@@ -134,7 +137,8 @@ impl<'a, const N: usize> Linear<'a, N> {
         })
     }
 
-    /// A Gaussian pulse with its best height beside a fit, and its size in standard deviations; zero where the fit's columns can imitate the pulse.
+    /// A Gaussian pulse with the height, N m or N, that best fits the torque left by `fitted`, and its size in standard deviations; size zero where
+    /// the columns of the fit can imitate the pulse.
     pub fn weigh(&self, fitted: &Fitted, bell: &Bell) -> Bell {
         let (residual, j) = (self.residual, bell.joint);
         let (first, last) = self.reach(bell);
@@ -146,7 +150,7 @@ impl<'a, const N: usize> Linear<'a, N> {
         let columns = &residual.joints[j].columns;
         let parts: Vec<&[f64]> = columns.iter().chain([&fitted.left[j]]).map(|x| &x[first..last]).collect();
         let (c, k) = (columns.len(), columns.len() + fitted.bells.len());
-        // What the bell shares with the columns, by the weights it is judged with and by those they are fitted with.
+        // Inner products of the pulse with the columns, under the weights for the test of pulses and under those for the fit of model errors.
         let products = cross(&[&judged, &heeded], &parts);
         let mut shared = DMatrix::<f64>::zeros(k, 2);
         for (s, weighted) in [&judged, &heeded].into_iter().enumerate() {

@@ -3,7 +3,7 @@
 //! * `bell`: Gaussian pulse of a push in the low-passed residual torque.
 //! * `fit`: size of a push by output error.
 //! * `intensity`: maximum likelihood intensities of random torques, and each joint's share of them.
-//! * `law`: effects of the library in the place of pushes.
+//! * `law`: effects of the library that explain the logs as well as pushes do.
 //! * `linear`: linear fit of possible model errors and Gaussian pulses.
 //! * `outlying`: pushes in windows whose prediction errors are far larger than typical.
 //! * `own`: the model fitted to one recording alone.

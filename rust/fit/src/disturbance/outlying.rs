@@ -1,8 +1,8 @@
 //! Pushes in windows whose prediction errors are far larger than typical.
 //!
 //! Accelerations are known from an encoder far worse than positions, so a light push may be lost in the noise of the residual torque and still move
-//! its joint by many times the typical prediction error. Where the model describes all but a few windows of a log to the noise, these windows are
-//! examined: the fit starts from the push that would explain most of a window to first order.
+//! its joint by many times the typical prediction error. Where the model describes all but a few windows of a log to the noise, those few windows are
+//! examined: a push is fitted, from the one that explains most of a window's errors to first order.
 
 use super::own::Own;
 use super::push::{Disturbance, Place, PushState};
@@ -15,7 +15,7 @@ use armgap_core::effect::{Quantity, find};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-/// Cost of a window, relative to a typical window, from which a push is looked for in it.
+/// Cost of a window, relative to that of a typical window, from which a push is looked for in the window.
 const OUTLYING: f64 = 30.0;
 
 /// Least share that a push in an outlying window must explain of the cost of the windows that it touches.
@@ -56,7 +56,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         }
     }
 
-    /// The push that explains most of the window of largest cost, to first order; `None` if its cost is not far above typical.
+    /// The push that explains most of the cost of the window with the largest cost, to first order; `None` if that cost is not far above the typical
+    /// one.
     fn in_worst_window(
         &self,
         place: Place,

@@ -1,6 +1,6 @@
 //! External pushes: torques at one time of one log that are no part of the logged torque, judged within this log.
 //!
-//! `residual` is the residual torque of a log beside possible model errors; `search` finds pulses in it that occur once and do not depend on the
+//! `residual` is the residual torque of a log, with possible model errors; `search` finds pulses in it that occur once and do not depend on the
 //! state; `outlying` finds pushes too light for `search`; `fit` sizes a push by output error, where the model is good enough; `law` tells pushes from
 //! the action of a torque limit or a stop.
 
@@ -24,19 +24,19 @@ use rayon::prelude::*;
 /// Shortest push that is reported, s.
 pub(super) const SHORTEST: f64 = 0.005;
 
-/// Largest gap between successive pieces of one recording, in sample periods.
+/// Largest time between successive pieces of one recording, in sample periods.
 const FOLLOWS: f64 = 8.0;
 
 /// Part of a joint's travel next to either limit that counts as its end.
 const NEAR_END: f64 = 0.12;
 
-/// Largest probability of a push where the model leaves errors unexplained.
+/// Factor on the probability of a push, and so its largest value, where the model leaves the whole gap unexplained.
 const REMAINDER_DOUBT: f64 = 0.5;
 
-/// Ratio of prediction errors with and without pushes above which the pushes are rejected.
+/// Ratio of the final RMS prediction errors on the holdout, with the pushes over without them, above which the pushes are rejected.
 const MUCH_WORSE: f64 = 1.5;
 
-/// Least impulse of a push, in its standard deviations, to be known as not zero.
+/// Least impulse of a push, in standard deviations of the impulse, for it to differ significantly from zero.
 const KNOWN: f64 = 2.0;
 
 /// Shortest recording in which pushes are looked for, s.
@@ -53,24 +53,24 @@ pub struct Disturbance {
     pub push: EffectInstance,
     /// Standard deviations of the push's impulse, N m s (N s), time, s, and duration, s.
     pub sigma: [f64; 3],
-    /// Share, 0 to 1, of the cost of the windows it touches that the push explains.
+    /// Share, 0 to 1, that the push explains of the cost of the windows which it touches.
     pub share: f64,
     /// Probability, 0 to 1, of a push rather than some other model error.
     pub probability: f64,
 }
 
-/// Attribution of the gap to causes, and the external disturbances found beside them.
+/// Result of a model search (attribution of the gap to causes), and the external disturbances found in the logs.
 pub struct Conclusion<const N: usize, const P: usize> {
-    /// Causes found with the external disturbances acting in their logs.
+    /// Result of the model search with the external disturbances acting in their logs.
     pub attribution: Attribution<N, P>,
-    /// Attribution without the external disturbances, if there are any.
+    /// Result of the model search without external disturbances in the logs; none if no disturbance was found.
     pub alone: Option<Attribution<N, P>>,
     /// External disturbances found in the logs.
     pub disturbances: Vec<Disturbance>,
 }
 
 impl<const N: usize, const P: usize> Conclusion<N, P> {
-    /// The attribution that was made without external disturbances.
+    /// Result of the model search without external disturbances in the logs.
     pub fn without_disturbances(&self) -> &Attribution<N, P> {
         self.alone.as_ref().unwrap_or(&self.attribution)
     }
@@ -82,7 +82,7 @@ impl<const N: usize, const P: usize> Conclusion<N, P> {
 
 /// The model and scales against which pushes are judged.
 pub(super) struct PushState<'a, const N: usize, const P: usize> {
-    /// The model with all named causes.
+    /// The model with all causes that the model search has found.
     pub(super) model: &'a Hypothesis<P>,
     /// Covariance of the model's free values.
     pub(super) covariance: &'a DMatrix<f64>,
@@ -92,9 +92,9 @@ pub(super) struct PushState<'a, const N: usize, const P: usize> {
     pub(super) zeros: &'a EncoderZeros<N>,
     /// Whether the model leaves more error unexplained than noise.
     pub(super) remainder: bool,
-    /// Least improvement, relative to the motion, of an effect or push to be named.
+    /// Least RMS improvement of the predictions, relative to the motion within a window, for an effect or push to be named.
     pub(super) min_relevance: f64,
-    /// Least improvement, relative to the motion, of a push to be named in a window far above the noise.
+    /// Least RMS improvement of the predictions, relative to the motion within a window, for a push in a window far above the noise to be named.
     pub(super) faintest: f64,
 }
 
@@ -102,11 +102,12 @@ pub(super) struct PushState<'a, const N: usize, const P: usize> {
 pub(super) type Place = (usize, usize);
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// The conclusion of a diagnosis: the attribution `alone`, its external disturbances, and the attribution beside them.
+    /// Conclusion of a diagnosis from the attribution `alone`, made without pushes: the pushes that it leaves unexplained, and the attribution
+    /// repeated with these pushes in their logs.
     ///
-    /// Where the model describes the arm, pushes are looked for again under the model fitted beside them. Where the model leaves errors unexplained,
-    /// the first pushes are kept, as the second model has taken up part of the pushes. Pushes are rejected if prediction errors with the model fitted
-    /// beside them are much larger than without. An effect that replaces some pushes stays in the model beside the remaining pushes.
+    /// Where the model describes the arm, pushes are looked for again under the model fitted together with the first ones. Where the model leaves
+    /// errors unexplained, the first pushes are kept, as the second model has taken up part of the pushes. Pushes are rejected if prediction errors
+    /// with pushes are much larger than without. An effect that replaces some pushes stays in the model together with the remaining pushes.
     pub fn conclude(
         &mut self,
         mut alone: Attribution<N, P>,
@@ -135,7 +136,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         if disturbances.is_empty() {
             return Conclusion::without(alone);
         }
-        // Like a further cause, a push answers for the gap it was taken up for.
+        // A push, like a further cause, is less probable where the gap that it was to explain remains.
         let left = left_over(&beside.nodes).max(left_beside(&alone.nodes, &beside.nodes));
         let belief = belief_beside(left, REMAINDER_DOUBT);
         for disturbance in &mut disturbances {
@@ -144,7 +145,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         Conclusion { attribution: beside, alone: Some(alone), disturbances }
     }
 
-    /// Pushes that the model of an attribution leaves unexplained, by recording; `faint`: also faint pushes in outlying windows.
+    /// Pushes in all recordings that the final model of a model search leaves unexplained; if `faint`, also faint pushes in outlying windows.
     fn disturbances(&self, attribution: &Attribution<N, P>, faint: bool) -> Vec<Disturbance> {
         let (first, last) = (&attribution.nodes[0], &attribution.nodes[attribution.nodes.len() - 1]);
         let state = PushState {
@@ -168,6 +169,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         found.into_iter().flatten().collect()
     }
 
+    /// Pushes in one recording, which consists of the logs at `places`; none if there are `MAX_PUSHES` or more.
     fn in_recording(&self, places: &[Place], state: &PushState<'_, N, P>) -> Vec<Disturbance> {
         let own = Own::new(self, places, state);
         let mut disturbances = Vec::new();
@@ -181,11 +183,11 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             let all: Vec<Bell> = disturbances.iter().map(Disturbance::as_bell).collect();
             disturbances.retain(|e| !self.meets_an_end(e, &all));
         }
-        // So many are no rare events, but something that the arm does again and again.
+        // `MAX_PUSHES` or more are no rare events, but something that the arm does again and again.
         if disturbances.len() < MAX_PUSHES { disturbances } else { Vec::new() }
     }
 
-    /// Pushes that stand out of the residual torque of a recording.
+    /// Pushes in a recording that stand out of its residual torque as Gaussian pulses, with sizes by output error.
     fn of_bells(
         &self,
         places: &[Place],
@@ -256,6 +258,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         recordings
     }
 
+    /// Whether log `after` continues log `before` as a piece of the same recording.
     fn follows(&self, before: Place, after: Place) -> bool {
         let (a, b) = (self.track(before), self.track(after));
         let gap = b.t[0] - a.t[a.len() - 1];
@@ -294,6 +297,7 @@ impl Disturbance {
         Bell { joint: self.push.joint, time, width, height, sigma: self.sigma[0], z: 0.0 }
     }
 
+    /// Index of the log in which the push acts: 0 for the training set or 1 for the holdout, then the index within the set.
     pub(super) fn place(&self) -> Place {
         (usize::from(self.holdout), self.track)
     }

@@ -1,8 +1,8 @@
 //! Low-passed residual torque of a whole log under a model, and columns of torques by which the model could be wrong.
 //!
-//! The residual torque is the torque that the measured motion needs minus the logged one. It and every column go through one low-pass, so that
-//! neither a lag nor noise of the acceleration enters only one of them. A push is a part of the residual torque that no combination of the columns
-//! explains: it does not recur with the state.
+//! The residual torque is the torque that the measured motion needs minus the logged one. Residual torque and columns go through the same low-pass,
+//! so that neither a lag nor noise of the acceleration enters only one of them. A push is a part of the residual torque that no combination of the
+//! columns explains: it does not recur with the state.
 
 use crate::likelihood::solve::Prior;
 use crate::log::track::Track;
@@ -50,7 +50,7 @@ const LOW_SPEED: f64 = 0.4;
 /// Least number of samples of a log in which pushes are looked for.
 const FEWEST: usize = 100;
 
-/// Length of the moving mean of a log's activity, s.
+/// Length of the moving mean of the motion's activity (squared torques, rates of torque, accelerations and speeds), s.
 const ACTIVE: f64 = 0.1;
 
 /// Residual torque of one joint over the grid of a log.
@@ -235,6 +235,7 @@ fn activity<const N: usize>(rows: &[Row<N>], low: &LowPass) -> Vec<Vec<f64>> {
     all
 }
 
+/// Mean of the values within `half` indices of each value.
 fn moving_mean(x: &[f64], half: usize) -> Vec<f64> {
     let mean = |i: usize| {
         let part = &x[i.saturating_sub(half)..(i + half + 1).min(x.len())];

@@ -1,7 +1,8 @@
 //! Standard deviation of a joint's residual torque at every point of a log: larger in violent motion, smaller in calm motion.
 //!
-//! The squared residual is modelled as a sum of non-negative multiples of the log's activity (multiplicative updates of the likelihood of a scale
-//! mixture, robust to single large values), and combined with the local median of the residual's size.
+//! The variance is modelled as a sum of non-negative multiples of the motion's activities (squared accelerations, speeds, torques and rates of
+//! torque), by multiplicative updates of the likelihood of a scale mixture, robust to single large values, and combined with the local median of the
+//! residual's size.
 
 use super::residual::Residual;
 use crate::log::track::median;
@@ -9,7 +10,7 @@ use crate::log::track::median;
 /// Degrees of freedom of the Student distribution assumed for the residual torque.
 const FREEDOM: f64 = 5.0;
 
-/// Multiplicative updates of the coefficients of activity.
+/// Number of multiplicative updates in the fit of the residual torque's variance to the motion's activities (squared accelerations, speeds, torques).
 const UPDATES: usize = 60;
 
 /// Smallest standard deviation of the residual torque that the activity of the motion may give, relative to the typical one.
@@ -18,10 +19,10 @@ const QUIET: f64 = 0.5;
 /// Largest standard deviation of the residual torque that the activity of the motion may give, relative to the typical one.
 const VIOLENT: f64 = 8.0;
 
-/// Half width of the stretch of a local median, s.
+/// Half width of the stretch of a log over which the local median of the residual torque's size is taken, s.
 const AROUND: f64 = 1.0;
 
-/// Least number of points for a local median.
+/// Number of grid points above which the local median of the residual torque's size is used.
 const FEWEST: usize = 40;
 
 /// Ratio of the standard deviation to the median absolute value of a normal variable.
@@ -30,7 +31,7 @@ const NORMAL: f64 = 1.4826;
 /// Least standard deviation of the residual torque, relative to the joint's typical torque.
 const FLOOR: f64 = 0.002;
 
-/// Standard deviation of joint `j`'s residual torque `left` at every grid point, N m or N.
+/// Standard deviation of joint `j`'s residual torque at every grid point, N m or N, from the torque `left` after the fit of model errors and pushes.
 pub fn scatter<const N: usize>(residual: &Residual<N>, j: usize, left: &[f64]) -> Vec<f64> {
     let moves: Vec<bool> = residual.joints[j].rest.iter().map(|r| *r < 0.3).collect();
     let of_moving = |x: &[f64]| x.iter().zip(&moves).filter(|(_, m)| **m).map(|(x, _)| x.abs()).collect();
@@ -50,7 +51,7 @@ pub fn scatter<const N: usize>(residual: &Residual<N>, j: usize, left: &[f64]) -
     (0..left.len()).map(at).collect()
 }
 
-/// Variance of the residual torque at every grid point by the activity of the motion.
+/// Variance of joint `j`'s residual torque at every grid point, (N m)^2 or N^2, as a sum of non-negative multiples of the motion's activities.
 fn by_activity<const N: usize>(
     residual: &Residual<N>,
     j: usize,

@@ -1,4 +1,4 @@
-//! Pushes in the residual torque of one log: Gaussian pulses that stand out beside all possible model errors.
+//! Pushes in the residual torque of one log: Gaussian pulses that stand out after the fit of all possible model errors.
 //!
 //! Parameters, unknown effects and pulses are fitted together, linearly; the gain of a pulse at one time, of one width, on one joint is compared with
 //! the scatter around the pulse and reduced by the part that other columns could imitate (generalised likelihood ratio). The largest pulses are added
@@ -35,14 +35,14 @@ const ABOVE_REMAINDER: f64 = 3.9;
 /// Size, in standard deviations, from which a pulse is a push where the model leaves errors unexplained, whatever the joint's friction.
 const CERTAIN: f64 = 12.0;
 
-/// Size, in standard deviations, that the largest pulse of a log must have for pushes to be looked for, while the scatter still contains all pulses.
-/// In a log without such a pulse there is no push, and there are no pushes that hide each other.
+/// Size, in standard deviations, that the largest pulse of a log must have for pushes to be looked for, while the scatter of the residual torque
+/// still contains all pulses. In a log without such a pulse there is no push, and there are no pushes that hide each other.
 const STANDS_OUT: f64 = 3.6;
 
 /// Least height of a push relative to the joint's friction at rest, where the model leaves errors unexplained.
 const ABOVE_FRICTION: f64 = 1.2;
 
-/// Largest number of pushes looked for in one log; as many are no rare events.
+/// Largest number of pushes looked for in one log; so many are no rare events but something that the arm repeats.
 pub const MAX_PUSHES: usize = 8;
 
 /// Least time that a joint must move in a log for pushes on it to be looked for, s.
@@ -104,7 +104,7 @@ impl<const N: usize> Search<'_, N> {
         }
     }
 
-    /// Removes pulses that are no push beside the others, the weakest first.
+    /// Removes pulses that are too small to count as pushes when fitted together with the others, the weakest first.
     fn drop_doubtful(&mut self, found: &mut Found) -> Option<()> {
         while !found.bells.is_empty() {
             self.settle(&mut found.bells)?;
@@ -136,7 +136,7 @@ impl<const N: usize> Search<'_, N> {
         Some(())
     }
 
-    /// Refines the times and widths of all pulses beside each other, with sizes relative to the scatter that they leave.
+    /// Refines the times and widths of all pulses in a common fit, with sizes in standard deviations of the residual torque that the fit leaves.
     fn settle(&mut self, bells: &mut Vec<Bell>) -> Option<()> {
         let fitted = self.linear.settle(bells)?;
         self.scan(&fitted);
@@ -150,7 +150,8 @@ impl<const N: usize> Search<'_, N> {
         if self.remainder { bell.z > CERTAIN || (bell.z > ABOVE_REMAINDER && above) } else { bell.z > LIKELY }
     }
 
-    /// Size, in standard deviations, of the pulse with index `i` beside the others, with its own torque counted in the scatter.
+    /// Size, in standard deviations, of the pulse with index `i` in a fit of the other pulses alone, so that its own torque enlarges the standard
+    /// deviation.
     fn unaided(&mut self, bells: &[Bell], i: usize) -> Option<f64> {
         let others = all_but(bells, i);
         let fitted = self.linear.settle(&others)?;
@@ -173,7 +174,8 @@ impl<const N: usize> Search<'_, N> {
         largest
     }
 
-    /// Scans pulses of one width on one joint over the log: their typical size, and the largest pulse in units of it.
+    /// Tries pulses of one width on one joint over the log: their typical size in standard deviations, and the largest pulse, its size relative to
+    /// the typical one.
     fn scan_kind(&self, fitted: &Fitted, joint: usize, width: f64) -> (f64, Option<Bell>) {
         let (from, to) = self.linear.span(width);
         let count = ((to - from) / COARSE).floor().max(0.0) as usize;
@@ -202,7 +204,7 @@ impl<const N: usize> Search<'_, N> {
         middle.max(sizes[sizes.len() * 9 / 10] / 1.645).max(1.0)
     }
 
-    /// Best times and widths of all pulses, each beside the others.
+    /// The pulses with their best times and widths, each refined while the others are fitted.
     fn refine(&self, bells: Vec<Bell>) -> Option<Vec<Bell>> {
         let mut bells = bells;
         for i in 0..bells.len() {
@@ -212,7 +214,8 @@ impl<const N: usize> Search<'_, N> {
         Some(bells)
     }
 
-    /// Best pulse near `bell` in time, of any width, beside a fit without it; `stands_out`: by size relative to chance pulses.
+    /// Pulse of the largest size near `bell` in time, of any of the widths, added to a fit without `bell`; if `stands_out`, sizes are compared
+    /// relative to those of chance pulses.
     fn best_near(&self, fitted: &Fitted, bell: &Bell, stands_out: bool) -> Bell {
         let mut best = Bell { z: -1.0, ..*bell };
         let mut largest = -1.0;

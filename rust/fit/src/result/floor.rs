@@ -9,22 +9,22 @@ use crate::numeric::random::Random;
 use crate::predict::window::{Dataset, InitialStateOffset, Window};
 use armgap_core::arm::Arm;
 
-/// Displaced initial states from which the errors of a perfect model are estimated: six give the mean square of one window to some 40 %, that of
-/// forty windows to 6 %.
+/// Number of randomly displaced initial states per window from which the errors of a perfect model are estimated: six give the mean square of one
+/// window to some 40 %, that of forty windows to 6 %.
 const DISPLACED: usize = 6;
 
 /// Cost per sample and joint up to which a window is consistent with its noise and its measured initial state: the noise is known to 3 %, and of some
 /// hundred values the mean square scatters by 15 %.
 const CONSISTENT: f64 = 1.5;
 
-/// A displaced initial state explains a window if the squares that it leaves beyond noise, with two standard deviations of them, times this factor
-/// are below the squared errors. A missing torque that is constant over the window leaves 1/36 of the squared errors it makes once the initial state
-/// is fitted, any other more; such a torque may make a quarter of the squared errors at most.
+/// Least ratio of the squared errors of a window to what a fitted initial state leaves of them beyond noise, plus two standard deviations, for an
+/// error of the initial state to explain the window. A missing torque that is constant over the window leaves 1/36 of the squared errors it makes
+/// once the initial state is fitted, any other more; such a torque may make a quarter of the squared errors at most.
 const TORQUE_SHARE: f64 = 4.0 * 36.0;
 
-/// Share of the windows that displaced initial states have to explain before any window counts as explained: where most are not explained, those that
-/// seem to be are the ones in which the model errs least, and their errors are not errors of initial states. With 0.7 as many of 42 floors are right,
-/// with 0.9 one fewer.
+/// Share of the windows that errors of their initial states must explain before any window counts as explained: where most are not explained, those
+/// that seem to be are the ones in which the model errs least, and their errors are not errors of initial states. With 0.7 as many of 42 estimated
+/// floors are right, with 0.9 one fewer.
 const MAJORITY: f64 = 0.5;
 
 /// Mean square position error of a perfect model by joint, rad^2 or m^2: noise of the samples, and errors of the measured initial states carried
@@ -68,14 +68,14 @@ fn explained(values: usize, square: f64, cost: f64, left: f64) -> bool {
 /// Mean square error of a perfect model, from the mean square error of a model by window (`missed`) and the mean square error by window that noise
 /// and the covariance of initial states predict (`expected`).
 ///
-/// In an explained window a perfect model errs as the model does. In any other window it errs by what is expected, times the ratio of missed to
-/// expected in explained windows, and by no more than the model. Where most windows are not explained, none counts as explained.
+/// In a window `explained` by noise and its initial state a perfect model errs as the model does. In any other it errs by what is expected, times the
+/// ratio of missed to expected in explained windows, and by no more than the model. Where most windows are not explained, none counts as explained.
 fn perfect_error(missed: &[f64], expected: &[f64], explained: &[bool]) -> f64 {
     let count = explained.iter().filter(|e| **e).count() as f64;
     let most = count >= MAJORITY * explained.len() as f64;
     let is_explained = |i: usize| most && explained[i];
     let of_explained = |of: &[f64]| (0..of.len()).filter(|&i| is_explained(i)).map(|i| of[i]).sum::<f64>();
-    // Without any explained window the ratio is none, and the larger number is one.
+    // Without any explained window the ratio is not a number (0/0), and `max` then gives one.
     let beyond = (of_explained(missed) / of_explained(expected)).max(1.0);
     let square = |i: usize| if is_explained(i) { missed[i] } else { missed[i].min(beyond * expected[i]) };
     (0..missed.len()).map(square).sum::<f64>() / missed.len() as f64
@@ -151,7 +151,7 @@ mod tests {
     fn the_floor_of_a_right_model_is_what_it_misses_by() {
         let (missed, expected) = ([4.0, 9.0, 1.0, 100.0], [1.0, 3.0, 1.0, 2.0]);
         let floor = perfect_error(&missed, &expected, &[true, true, true, false]);
-        // Explained windows miss by 14/5 of what is expected, and so would the fourth.
+        // In explained windows the square error is 14/5 of what is expected, and so it would be in the fourth.
         assert!((floor - (14.0 + 2.0 * 2.8) / 4.0).abs() < 1e-12, "{floor}");
     }
 

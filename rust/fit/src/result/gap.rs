@@ -13,13 +13,13 @@ use crate::result::report::{AtHorizon, FreeRun, FreeRunSeries, Gap, SecondHalves
 use armgap_core::arm::Arm;
 use rayon::prelude::*;
 
-/// Points of a drawn curve at most.
+/// Largest number of points of a drawn curve of positions over time.
 const DRAWN: usize = 2500;
 
-/// Holdout logs whose curves are drawn at most.
+/// Largest number of holdout logs whose curves of positions over time are drawn.
 const DRAWN_LOGS: usize = 3;
 
-/// Resamples of the holdout windows for the confidence interval of the closed share.
+/// Number of bootstrap resamples of the holdout windows for the confidence interval of the closed share.
 const RESAMPLES: usize = 500;
 
 /// Prediction horizons at which the gap is reported besides the chosen one, s.
@@ -28,7 +28,7 @@ pub(crate) const HORIZONS: [f64; 3] = [0.1, 0.5, 1.0];
 /// Largest free-run error that is reported, rad or m: a larger one only says that the run diverged.
 const FREE_RUN_LIMIT: f64 = 100.0;
 
-/// The three hypotheses that a report compares.
+/// The three models whose predictions a report compares.
 pub struct Compared<const P: usize> {
     /// The arm file as it is, without effects.
     pub before: Hypothesis<P>,
@@ -50,7 +50,7 @@ pub struct Errors<const N: usize> {
 }
 
 impl<const N: usize> Errors<N> {
-    /// Predicts the holdout with the three compared hypotheses; `zeros` are encoder zeros of its recordings.
+    /// Predicts the holdout with the three compared models; `zeros` are the encoder zeros of the holdout's recordings.
     pub fn new<A: Arm<f64, N, P>, const P: usize>(
         context: &DiagnosisContext<A, N, P>,
         compared: &Compared<P>,
@@ -98,7 +98,7 @@ pub fn rms<const N: usize>(measured: &[f64], predicted: &[f64]) -> Vec<f64> {
     (0..N).map(|j| (squares(j) / rows).sqrt()).collect()
 }
 
-/// Gap on the holdout before, with parameters re-estimated, and with the named causes.
+/// Gap on the holdout of the arm file as it is, with parameters re-estimated, and with the named causes.
 pub fn gap<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     context: &DiagnosisContext<A, N, P>,
     compared: &Compared<P>,
@@ -137,7 +137,7 @@ pub fn gap<A: Arm<f64, N, P>, const N: usize, const P: usize>(
 }
 
 /// RMS errors of a model on the second halves of the holdout logs, with positions as measured and with the encoder zeros that the first halves show;
-/// none where recordings do not differ or a half has no window.
+/// none where the holdout has no encoder zeros of its own or a half has no window.
 fn second_halves<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     context: &DiagnosisContext<A, N, P>,
     model: &Hypothesis<P>,
@@ -198,11 +198,12 @@ pub(crate) fn closed(before: &[f64], after: &[f64], floor: &[f64]) -> f64 {
     if b > 0.0 { 1.0 - a / b } else { 0.0 }
 }
 
+/// Largest of the errors `before` over the joints, positive: the common unit of the errors in the closed share.
 fn before_scale(before: &[f64]) -> f64 {
     before.iter().copied().fold(f64::MIN_POSITIVE, f64::max)
 }
 
-/// 95 % interval of the closed share of the gap, from resampled holdout windows.
+/// 95 % interval of the closed share of the gap, from bootstrap resamples of the holdout windows.
 fn closed_interval<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     context: &DiagnosisContext<A, N, P>,
     errors: &Errors<N>,
@@ -259,7 +260,7 @@ pub(crate) fn limited(measured: &[f64], predicted: &[f64]) -> Vec<f64> {
     predicted.iter().zip(measured).map(|(p, m)| within(p, m)).collect()
 }
 
-/// Simulations of whole holdout logs from their first sample, with the arm file as it is and with the causes.
+/// Free runs: simulations of whole holdout logs from their first sample, with the arm file as it is and with the causes.
 pub struct FreeRuns<const N: usize> {
     data: Dataset<N>,
     measured: Vec<f64>,

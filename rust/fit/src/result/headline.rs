@@ -1,4 +1,4 @@
-//! Choice of the causes that a diagnosis names, by their size, value and probability, as many as are allowed. The rest become candidates.
+//! Choice of the causes that a diagnosis names, by their size, value and probability, as many as are allowed. The rest are listed as candidates.
 //!
 //! The model reported has the named causes only, so that the gap "after" is what a reader who applies them gets.
 
@@ -15,7 +15,7 @@ use armgap_core::effect::{NEVER, Trial};
 const NAMEABLE: f64 = 0.3;
 
 /// Probability below which a fitted value that arms hardly ever have (a negative spring stiffness) is not named. Single logs of a real arm whose
-/// encoders start from another zero each gave negative stiffnesses up to 0.80 (docs/real-arm.md).
+/// encoders have another zero in each log gave negative stiffnesses with probabilities up to 0.80 (docs/real-arm.md).
 const LIKELY: f64 = 0.9;
 
 /// Gains of a drive, delivered over commanded torque: beyond this range, the unit of the torque column is wrong, not the drive.
@@ -42,7 +42,7 @@ pub struct Headline<const N: usize, const P: usize> {
     pub open: bool,
     /// Named causes, strongest first.
     pub causes: Vec<Cause>,
-    /// Named external disturbances, clearest first.
+    /// Named external disturbances, the largest impulse in its standard deviations first.
     pub disturbances: Vec<Disturbance>,
     /// Causes that were found and are not named, with reasons.
     pub candidates: Vec<Unnamed<Cause>>,
@@ -73,11 +73,11 @@ fn impossible(effect: &EffectInstance, probability: f64) -> Option<String> {
 }
 
 /// Reason why the size of an effect cannot be told from zero: its standard deviation is as large as the size; none if it can be. Effects with a
-/// threshold or a transmission always pass, as their standard deviation is along other values too and the search has compared the whole effect with
-/// its absence.
+/// threshold or a transmission always pass, as the standard deviation of their size includes that of other values, and the model search has compared
+/// the whole effect with its absence.
 fn uncertain(effect: &EffectInstance, sigma: &[f64]) -> Option<String> {
     let spec = effect.law.spec();
-    // Along a ray all values leave nothing together, and the first is the size.
+    // For an effect tested along a ray (`Trial::Ray`) all values tend to zero together, and the first one is the size.
     let count = if spec.trial == Trial::Ray { 1 } else { effect.amplitudes() };
     let amplitudes = spec.parameters.iter().zip(effect.p).zip(sigma).take(count);
     let deviations = amplitudes.map(|((parameter, value), sigma)| {
@@ -110,6 +110,7 @@ fn sorted<T>(
     (named, rest)
 }
 
+/// At most `most` causes to be named, and the rest with the reasons why they are not.
 fn sorted_causes(causes: &[Cause], most: usize) -> (Vec<Cause>, Vec<Unnamed<Cause>>) {
     sorted(causes.to_vec(), most, most, |c| unfit(&c.effect, &c.sigma, c.probability))
 }
@@ -165,7 +166,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             return (attribution.model.clone(), last.weights.clone(), open);
         }
         let (mut model, weights, open) = if causes.is_empty() && disturbances.is_empty() {
-            // The last one without effects: the arm with parameters estimated again, and what friction regularisation that alone asked for.
+            // The last search node without effects: the arm with parameters re-estimated, and the friction regularisation that was fitted without
+            // effects.
             let bare = |i: &usize| attribution.nodes[*i].settled.hypothesis.effects.is_empty();
             let node = (0..attribution.nodes.len()).rfind(bare).map_or(last, |i| &attribution.nodes[i]);
             (node.settled.clone(), node.weights.clone(), node.is_unexplained())

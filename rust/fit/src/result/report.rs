@@ -81,7 +81,7 @@ pub struct Diagnosis {
     pub schema: &'static str,
     /// Answer of the diagnosis in one word.
     pub verdict: Verdict,
-    /// Prediction errors on the holdout before and after, by joint.
+    /// Prediction errors on the holdout by joint, of the arm file as it is and with the named causes.
     pub gap: Gap,
     /// Share of each joint in the gap, and the regimes in which the gap is large.
     #[serde(rename = "where")]
@@ -94,7 +94,7 @@ pub struct Diagnosis {
     pub candidates: Vec<Candidate>,
     /// Effects that were looked for and not found.
     pub ruled_out: Vec<RuledOut>,
-    /// Parameters of the arm: nominal, re-estimated, and re-estimated beside the causes.
+    /// Parameters of the arm: nominal, re-estimated, and re-estimated together with the causes.
     pub parameters: Parameters,
     /// Re-estimated parameters of the reported model that are not to be believed as they stand.
     pub sanity: Vec<Sanity>,
@@ -162,7 +162,8 @@ pub struct Gap {
     pub horizons: Vec<AtHorizon>,
     /// RMS position errors of simulations of whole holdout logs from their first sample.
     pub free_run: FreeRun,
-    /// Gap with the encoder zeros of each recording known; where encoder zeros differ between recordings.
+    /// Gap on the second halves of the holdout logs, with the encoder zeros of each recording known; only where encoder zeros differ between
+    /// recordings.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub second_halves: Option<SecondHalves>,
 }
@@ -213,7 +214,7 @@ pub struct FreeRun {
 pub struct Cause {
     /// Name of the effect in the library.
     pub effect: &'static str,
-    /// Title of the effect for people.
+    /// Title of the effect in plain words.
     pub title: &'static str,
     /// 1-based joint that the cause acts on; none for the whole arm or for several joints.
     #[schemars(range(min = 1))]
@@ -228,7 +229,7 @@ pub struct Cause {
     pub parameters: Named<CauseValue>,
     /// Share of the gap above the noise floor that the cause removed when it was added.
     pub closed: f64,
-    /// Effects that these logs do not tell from the cause.
+    /// Effects that the diagnosed logs cannot distinguish from the cause.
     pub equivalents: Vec<EquivalentSummary>,
     /// Figures from which the probability of the cause follows; none for external disturbances.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -248,7 +249,7 @@ pub struct SidesSummary {
     pub encoder: &'static str,
     /// Side of the transmission that friction acts on.
     pub friction: &'static str,
-    /// Motion of the rotor of an elastic transmission with the joints before its own: `rides`, or `geared` where it hardly moves with them.
+    /// Whether the rotor of an elastic transmission moves with the joints before its own: `rides`, or `geared` where it hardly does.
     pub rotor: &'static str,
 }
 
@@ -271,7 +272,7 @@ pub struct Candidate {
     pub why: String,
 }
 
-/// An effect that these logs do not tell from a cause.
+/// An effect that the diagnosed logs cannot distinguish from a cause.
 #[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct EquivalentSummary {
     /// Name of the effect in the library.
@@ -333,14 +334,14 @@ pub struct Bound {
     pub level: f64,
 }
 
-/// Parameters of the arm by name: nominal, re-estimated, and re-estimated beside the causes.
+/// Parameters of the arm by name: nominal, re-estimated, and re-estimated together with the causes.
 #[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct Parameters {
     /// Parameters of the arm file.
     pub nominal: Named<Value>,
     /// Parameters re-estimated on the training logs without effects.
     pub refit: Named<Value>,
-    /// Parameters re-estimated on the training logs beside the named causes.
+    /// Parameters re-estimated on the training logs together with the named causes.
     pub with_causes: Named<Value>,
 }
 
@@ -381,7 +382,7 @@ pub struct LogSummary {
 pub struct Ranked {
     /// Name of the candidate effect in the library.
     pub effect: &'static str,
-    /// Title of the candidate effect for people.
+    /// Title of the candidate effect in plain words.
     pub title: &'static str,
     /// 1-based joint that the candidate effect acts on; none for the whole arm.
     #[schemars(range(min = 1))]
@@ -403,11 +404,11 @@ pub struct StageSummary {
     pub added: Option<EquivalentSummary>,
     /// RMS position error on the holdout before the step, by joint, rad or m.
     pub rms: Vec<f64>,
-    /// Cost of the holdout before the step over the cost that noise alone leaves.
+    /// Ratio of the cost of the holdout before the step to the cost that measurement noise alone leaves.
     pub excess: f64,
     /// Squared distance of the arm's parameters from their prior values before the step, in standard deviations.
     pub trust: f64,
-    /// RMS position error before the step relative to the motion within the windows.
+    /// RMS position error on the holdout before the step, relative to the RMS motion within the windows.
     pub relative_error: f64,
 }
 

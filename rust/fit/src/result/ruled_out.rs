@@ -13,10 +13,10 @@ use armgap_core::effect::{Scope, Spec, Trial, catalogue};
 /// Standard deviation of an effect's size, relative to a typical size, above which the logs have not excited the effect.
 const PINNED: f64 = 0.5;
 
-/// Share of the remaining gap that an effect could explain above which it is not called absent.
+/// Share of the remaining gap above which an effect that could explain as much is not called absent.
 const COULD_BE: f64 = 0.1;
 
-/// Status of every candidate that is no cause, from its first-order test around the final model.
+/// Status of every candidate effect that is no cause, from its score test (first-order) around the final model.
 pub fn ruled_out<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     context: &DiagnosisContext<A, N, P>,
     attribution: &Attribution<N, P>,
@@ -39,7 +39,7 @@ pub fn ruled_out<A: Arm<f64, N, P>, const N: usize, const P: usize>(
             doubt(&mut entry, test, remains);
         }
         match list.iter_mut().find(|(place, _)| place.same_place(&test.effect)) {
-            // The weakest statement over an effect's shapes holds for the effect.
+            // Of the tests of an effect at several initial guesses, the weakest statement holds for the effect.
             Some((_, known)) if weaker(&entry, known) => *known = entry,
             Some(_) => {}
             None => list.push((test.effect, entry)),
@@ -55,7 +55,7 @@ pub fn ruled_out<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     entries
 }
 
-/// Status of the effects for which no candidate is tested.
+/// Status of the effects for which no candidate is tested: external disturbances, and effects that other values always imitate.
 fn never_fitted<const N: usize>() -> Vec<RuledOut> {
     let laws = catalogue::<f64>().iter().map(|law| law.spec());
     let unsearched = laws.filter(|spec| spec.initial_guesses.is_empty() && spec.least_joints <= N);
@@ -83,11 +83,13 @@ fn never_fitted<const N: usize>() -> Vec<RuledOut> {
     unsearched.flat_map(|spec| places(spec).into_iter().map(move |joint| entry(spec, joint))).collect()
 }
 
+/// Whether entry `a` states less than entry `b`: a less certain status, or a larger bound at the same status.
 fn weaker(a: &RuledOut, b: &RuledOut) -> bool {
     let size = |r: &RuledOut| r.bound.as_ref().map_or(f64::INFINITY, |b| b.value);
     (a.status, size(a)) > (b.status, size(b))
 }
 
+/// Status and upper bound of the size of one candidate effect, from its score test.
 fn status<A, const N: usize, const P: usize>(
     context: &DiagnosisContext<A, N, P>,
     test: &ScoreTest,
@@ -159,13 +161,15 @@ fn leave_open(entry: &mut RuledOut, instead: &EffectInstance) {
     }
 }
 
-/// Makes an absent effect undecided if its largest possible size would explain a part that matters of the remaining gap, of cost `remains`.
+/// Makes an absent effect undecided if at its largest possible size it would explain a considerable share of the remaining gap, whose cost is
+/// `remains`.
 fn doubt(entry: &mut RuledOut, test: &ScoreTest, remains: f64) {
     let most = entry.bound.as_ref().map_or(test.gain, |bound| (bound.value / test.information_sigma).powi(2));
     let share = (most / remains).min(1.0);
     let law = test.effect.law;
     if entry.status == Status::Absent && law.spec().trial == Trial::Whole && !law.has_transmission() {
-        // A stop or a limit: its trial values lie where the training logs went, and what remains may lie where only the holdout did.
+        // An effect with a threshold: the trial thresholds lie within the motion of the training logs, and the gap may arise beyond, where only the
+        // holdout went.
         entry.status = Status::Undecided;
         entry.why = Some(
             "a gap remains, and it may begin beyond where the training logs went; let them reach what the holdout reaches".to_owned(),
@@ -177,7 +181,7 @@ fn doubt(entry: &mut RuledOut, test: &ScoreTest, remains: f64) {
     }
 }
 
-/// Status of an effect that begins beyond a threshold: excited if any trial threshold was passed.
+/// Status of an effect that acts beyond a threshold: excited if any trial threshold was passed.
 fn threshold_status(test: &ScoreTest) -> RuledOut {
     let spec = test.effect.law.spec();
     let (effect, joint) = (spec.name, test.effect.joint_number());

@@ -4,10 +4,11 @@ use armgap_core::arm::{ArmKind, Parameter};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-/// Standard deviations of the arm file beyond which an estimated value is not one that the arm file allows: by chance, one in a million.
+/// Distance of an estimated parameter from its nominal value, in standard deviations of the arm file, beyond which the arm file does not allow the
+/// value: by chance, one in a million.
 const FAR: f64 = 5.0;
 
-/// Standard deviations from zero beyond which the sign of an estimated value is known.
+/// Size of an estimated value, in its standard deviations, beyond which the sign of the value is known.
 const KNOWN: f64 = 2.0;
 
 /// Ratio of a nominal to an estimated value, in size, below which the nominal value counts as zero and its sign as unknown.
@@ -64,6 +65,7 @@ pub struct Estimate {
 }
 
 impl Estimate {
+    /// Distance of the estimated from the nominal value, in standard deviations of the arm file.
     fn distance(&self) -> f64 {
         (self.value - self.nominal).abs() / self.prior
     }
@@ -75,6 +77,7 @@ impl Estimate {
             && self.nominal.abs() > COMPARABLE * self.value.abs()
     }
 
+    /// Whether the estimate stayed near the nominal value because the logs say less about the parameter than the arm file does.
     fn is_unmoved(&self) -> bool {
         self.distance() < FAR && self.sigma > UNSEEN * self.prior
     }
@@ -85,7 +88,7 @@ fn is_gravity(kind: ArmKind, index: usize) -> bool {
     index < kind.inertial() && matches!(kind.parameters()[index].unit, "N m" | "N")
 }
 
-/// Reasons why re-estimated parameters are not to be believed; `remains` says whether they leave a gap.
+/// Re-estimated parameters that are not to be believed, with reasons; `remains` says whether a gap is left with the estimates.
 pub fn sanity(kind: ArmKind, estimates: &[Estimate], remains: bool) -> Vec<Sanity> {
     let stuck = remains && estimates.iter().all(Estimate::is_unmoved);
     let one = |(i, (parameter, estimate)): (usize, (&Parameter, &Estimate))| {
@@ -140,7 +143,8 @@ fn significant(value: f64) -> String {
     format!("{value:.0$}", places as usize)
 }
 
-/// Standard deviations of parameters `theta`, limited to ten times the value (or the largest value of the same unit).
+/// Standard deviations `sigma` of the parameters `theta`, each limited to ten times its parameter's value, or to ten times the largest value of the
+/// same unit if that value is zero.
 pub fn bounded_sigma(kind: ArmKind, theta: &[f64], sigma: &[f64]) -> Vec<f64> {
     let parameters = kind.parameters();
     let largest = |unit: &str| {

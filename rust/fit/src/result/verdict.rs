@@ -19,7 +19,7 @@ const IMPROVABLE: f64 = 2.0;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, JsonSchema, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Verdict {
-    /// The gap is within noise, or of no consequence beside the motion.
+    /// The gap is within noise, or of no consequence in relation to the motion.
     None,
     /// Re-estimated parameters close the gap: the structure of the model is right, its values were wrong.
     Parameters,
@@ -54,7 +54,7 @@ impl Evidence<'_> {
         self.open || self.stands_out(self.after)
     }
 
-    /// Whether the `error` of some joint, rad or m, is several noise floors and of consequence beside the joint's motion.
+    /// Whether the `error` of some joint, rad or m, is several noise floors and of consequence in relation to the joint's motion.
     fn stands_out(&self, error: &[f64]) -> bool {
         let limits = self.floor.iter().zip(self.motion);
         error
@@ -76,7 +76,7 @@ impl Evidence<'_> {
         match () {
             () if self.named => Verdict::Effect,
             () if self.remains() => Verdict::Unexplained,
-            // What only re-estimated values bring down to the noise is not within noise as it is.
+            // A gap that only re-estimated parameters bring down to the noise is more than noise with the arm file as it is.
             () if self.is_improved() || self.stands_out(self.before) => Verdict::Parameters,
             () => Verdict::None,
         }
@@ -126,13 +126,13 @@ mod tests {
 
     #[test]
     fn no_error_of_several_true_floors_is_called_noise_under_a_floor_that_is_claimed_too_high() {
-        // The 5 and 95 % points of claimed over true floors.
+        // Ratios of the estimated to the true noise floor: the 5 and 95 % points, and 1.
         for claimed in [0.82, 1.0, 1.25] {
             let left = 4.01 / claimed;
             assert_eq!(of([100.0, left, left], 1e3, false, false), Verdict::Unexplained, "{claimed}");
             assert_eq!(of([left; 3], 1e3, false, false), Verdict::Unexplained, "{claimed}");
         }
-        // What scatters by twice is still noise under a floor that is claimed too low.
+        // An error of twice the true floor is still noise under an estimated floor that is too low.
         for claimed in [0.82, 1.0, 1.25] {
             assert_eq!(of([2.0 / claimed; 3], 1e3, false, false), Verdict::None, "{claimed}");
         }

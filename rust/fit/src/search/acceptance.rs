@@ -1,7 +1,7 @@
 //! Acceptance criteria of a cause in the model search.
 //!
-//! A cause is accepted when it removes a part of the gap that matters, on windows of other motions too, and by more than the windows' own scatter, or
-//! when it brings the parameters back to their prior values.
+//! A candidate effect is accepted as a cause if it removes a considerable share of the gap, on the holdout too, by more than the scatter between
+//! windows, or if fitted parameters that were implausible return to their prior values with it.
 
 use crate::likelihood::holdout::CONSEQUENTIAL_ERROR;
 use crate::likelihood::holdout::is_plausible;
@@ -9,108 +9,123 @@ use crate::model::hypothesis::EffectInstance;
 use crate::search::attribute::{Candidate, SearchNode};
 use armgap_core::effect::Quantity;
 
-/// Mean advantage per window, in standard errors, below which a cause is not accepted.
+/// Least mean decrease of the windows' cost by a candidate effect, in standard errors of this mean, for the candidate to be accepted as a cause.
 pub const CERTAIN: f64 = 3.5;
 
-/// Mean advantage per window, in standard errors, below which a nuisance, which is never named, is not accepted.
+/// Least mean decrease of the windows' cost by friction regularisation, a nuisance that is never named, in standard errors of this mean, for it to be
+/// accepted.
 const CERTAIN_ENOUGH: f64 = 2.5;
 
-/// Mean advantage per holdout window, in standard errors, below which a cause is not accepted: the holdout alone has fewer windows and must only
-/// agree.
+/// Least mean decrease of the holdout windows' cost by a candidate, in standard errors of this mean, for the candidate to be accepted: the holdout
+/// alone has fewer windows than all logs and must only agree with them.
 const HOLDOUT_CERTAIN: f64 = 1.0;
 
-/// Share of the gap above the noise floor below which an improvement does not matter.
+/// Share of the gap above the noise floor that an effect must remove for its improvement to count.
 pub const MATTERS: f64 = 0.1;
 
-/// Share of a gap of no consequence below which an improvement does not matter: only an effect that explains most of it counts.
+/// Share of the gap above the noise floor that a candidate must remove where the gap is of no consequence (RMS error relative to the motion below
+/// `CONSEQUENTIAL_ERROR`): only an effect that explains most of such a gap counts.
 const MATTERS_IN_SMALL: f64 = 0.5;
 
-/// Ratio of the cost to its noise floor below which there is nothing left to explain.
+/// Ratio of the holdout's cost to its noise floor (the cost that measurement noise alone leaves) up to which no gap is left to explain.
 pub const ABOVE_FLOOR: f64 = 1.25;
 
-/// Cost of a typical window, relative to what noise alone leaves, up to which a gap is due to a few outlying windows.
+/// Largest ratio of a typical holdout window's cost to the cost that noise alone leaves at which only a few outlying windows make up the gap.
 const AT_FLOOR: f64 = 1.5;
 
-/// Least decrease of the cost of outlying windows by a candidate that explains them: in standard deviations of a typical window's cost where that is
-/// noise, in costs of a typical window elsewhere.
+/// Least decrease of the cost, summed over the windows that a candidate improves, for the candidate to explain outlying windows: in standard
+/// deviations of a typical window's cost where that cost is noise, in typical windows' costs elsewhere.
 const OUTLYING: f64 = 30.0;
 
-/// Largest increase of the cost of all other windows by a candidate that explains outlying windows, as a part of the decrease of their cost.
+/// Largest increase of the cost of all other windows by a candidate that explains outlying windows, relative to the decrease of the outlying windows'
+/// cost.
 const HARMLESS: f64 = 0.05;
 
-/// Decrease of the prior cost, in squared standard deviations, that makes a cause on its own.
+/// Decrease of the prior cost (squared distance of the parameters from the arm file's values, in standard deviations) by an effect beyond which the
+/// effect is a cause for this alone.
 pub const TRUST_GAIN: f64 = 16.0;
 
-/// Unexplained gap, relative to the motion, that moves the parameters by about as much as their prior standard deviations: what an unmodelled torque
-/// adds to a gap, it also adds to the parameters that are fitted to it.
+/// RMS prediction error, relative to the motion within a window, at which unmodelled torques bias the fitted parameters by about one prior standard
+/// deviation: the parameters are fitted to the same errors that make up the gap.
 const MOVES_A_SIGMA: f64 = 0.02;
 
-/// Difference of prior costs, in squared standard deviations, below which two candidates are look-alikes.
+/// Difference of the prior costs of two candidates (squared distances of the parameters from their prior values, in standard deviations) below which
+/// the candidates are look-alikes.
 pub const ALIKE_TRUST: f64 = 6.0;
 
-/// Ratio of the cost to its noise floor beyond which a gap without a cause is called unexplained.
+/// Ratio of the holdout's cost to its noise floor (the cost that measurement noise alone leaves) beyond which a gap without a cause is called
+/// unexplained.
 pub const UNEXPLAINED: f64 = 4.0;
 
-/// Improvement relative to the motion within a window below which an effect is of no consequence.
+/// RMS improvement of the predictions by an effect, relative to the motion within a window, below which the effect is of no consequence.
 pub const RELEVANT: f64 = 1e-4;
 
-/// Smallest gap, relative to the motion, that is searched for causes: a gap too small to matter by itself, which is searched if it stands far above
-/// the noise floor.
+/// Smallest RMS prediction error, relative to the motion within a window, that is searched for causes: so small a gap does not matter by itself and
+/// is searched only if it stands far above the noise floor.
 pub const FAINTEST: f64 = 5e-6;
-/// Ratio of the cost to its noise floor from which a gap too small to matter by itself is searched for causes.
+/// Ratio of the holdout's cost to its noise floor (the cost that measurement noise alone leaves) from which a gap too small to matter by itself is
+/// searched for causes.
 pub const CLEAR: f64 = 2.75;
 
-/// Share of a gap too small to matter by itself that a cause must explain: no error of the integrator explains as much.
+/// Share of the gap above the noise floor that a cause must remove where the gap is too small to matter by itself: no error of the numerical
+/// integrator explains as much.
 const MATTERS_IF_FAINT: f64 = 0.7;
 
-/// Mean advantage per window, in standard errors, that a cause of a gap too small to matter by itself must have.
+/// Least mean decrease of the windows' cost by a candidate, in standard errors of this mean, for it to be the cause of a gap too small to matter by
+/// itself.
 const CERTAIN_IF_FAINT: f64 = 5.0;
 
-/// Power of the explained share of the gap in the probability of causes: effects that are in no library were seen to be imitated by two or three that
-/// are, for up to eight tenths of the gap.
+/// Exponent of the explained share of the gap in a factor on probabilities: an effect that the library does not have was seen to be imitated by two
+/// or three of its effects, for up to eight tenths of the gap.
 pub const REMAINDER_POWER: i32 = 6;
 
-/// Improvement relative to the first gap below which an effect is no cause of the gap.
+/// RMS improvement of the predictions by an effect, relative to the RMS prediction error before any cause was added, below which the effect is no
+/// cause of the gap.
 const NOTICEABLE: f64 = 0.02;
 
-/// Part of the largest possible size of an effect above which a fit has found no effect.
+/// Size of a fitted effect, relative to the largest size that a fit allows, from which the fit has run to its bound and has found no effect.
 const AT_BOUND: f64 = 0.98;
 
-/// Resamples of the windows for the selection probability of a cause.
+/// Number of bootstrap resamples of the windows from which the selection probability of a cause is estimated.
 pub const RESAMPLES: usize = 400;
 
-/// Look-alikes that are listed with a cause at most: what a reader takes in.
+/// Largest number of look-alikes (effects that the logs cannot distinguish from a cause) that are listed with a cause: as many as a reader takes in.
 pub const LOOK_ALIKES: usize = 3;
 
-/// Part of the best candidate's advantage from which a candidate with fewer parameters is preferred.
+/// Decrease of the cost by a candidate, relative to the decrease by the best one, from which both do almost as well and the one with fewer parameters
+/// is preferred.
 pub const ALMOST: f64 = 0.95;
 
-/// Part of the best candidate's advantage from which one with fewer parameters is preferred if even the best leaves most of the gap to other causes.
+/// Decrease of the cost by a candidate with fewer parameters, relative to the decrease by the best one, from which the simpler candidate is preferred
+/// if even the best one leaves most of the gap to other causes.
 const ALMOST_IN_DOUBT: f64 = 0.6;
 
-/// Share of the gap above which a candidate explains most of the gap.
+/// Share of the gap above the noise floor that a candidate must remove to explain most of the gap.
 const MOST: f64 = 0.5;
 
-/// Part of the winner's advantage within which the cost of a look-alike lies.
+/// Difference between the costs of the best candidate and another one, relative to the decrease of the cost by the best one, below which the two are
+/// look-alikes, which the logs cannot distinguish.
 const LOOK_ALIKE: f64 = 0.03;
 
-/// Smallest improvement, RMS relative to the motion, for which a cause is named, given the relative error `first_gap` before any cause. What is of
-/// consequence by itself is always named.
+/// Smallest RMS improvement of the predictions, relative to the motion within a window, for which an effect is named as a cause, given the RMS error
+/// `first_gap`, relative to the same motion, before any cause. An improvement of consequence by itself (`CONSEQUENTIAL_ERROR`) always suffices.
 pub fn min_relevance(first_gap: f64) -> f64 {
     (NOTICEABLE * first_gap).clamp(RELEVANT, CONSEQUENTIAL_ERROR)
 }
 
 impl<const N: usize, const P: usize> SearchNode<N, P> {
-    /// Whether the data hardly prefer candidate `best` to candidate `other`.
+    /// Whether candidates `best` and `other` are look-alikes: the cost of `other` is higher by only a small part of the decrease that `best` brings,
+    /// or by less than one standard error over the windows.
     pub fn is_alike(&self, best: &Candidate<P>, other: &Candidate<P>) -> bool {
         let advantage = self.base.score() - best.score();
         other.score() - best.score() < (LOOK_ALIKE * advantage).max(3.0) || best.z_over(other) < 1.0
     }
 
-    /// Whether a candidate explains windows whose errors stand far out of the noise, in training and holdout, while no other window gets worse.
+    /// Whether a candidate explains windows whose errors stand far out of the noise, in the training logs and in the holdout, while no other window
+    /// gets worse.
     ///
-    /// An effect that shows in a few windows, such as a joint limit that is hardly touched, never has a mean advantage of many standard errors. The
-    /// effect needs none where all other windows are at the noise floor: the noise is known there, and the errors that the effect explains are not
+    /// An effect that acts in a few windows only, such as a joint limit that is hardly touched, never lowers the mean cost by many standard errors.
+    /// This is not required where all other windows are at the noise floor: the noise is known there, and the errors that the effect explains are not
     /// noise.
     fn settles_outliers(&self, candidate: &Candidate<P>) -> bool {
         self.is_typically_noise()
@@ -119,28 +134,31 @@ impl<const N: usize, const P: usize> SearchNode<N, P> {
             && self.settles(&candidate.holdout, &self.base.holdout)
     }
 
-    /// Whether fit `fit` explains windows of the training or of the holdout that stand far out of noise under fit `other`, while no other window gets
-    /// worse.
+    /// Whether candidate `fit` explains windows of the training logs or of the holdout whose errors stand far out of the noise under candidate
+    /// `other`, while no other window gets worse.
     pub fn takes_outliers(&self, fit: &Candidate<P>, other: &Candidate<P>) -> bool {
         self.settles(&fit.training, &other.training) || self.settles(&fit.holdout, &other.holdout)
     }
 
-    /// Whether a typical window's cost is what noise alone leaves.
+    /// Whether the cost of a typical holdout window is about what measurement noise alone leaves.
     fn is_typically_noise(&self) -> bool {
         self.weights.holdout.typical < AT_FLOOR * self.floor / self.base.holdout.len() as f64
     }
 
+    /// Whether window costs `mine` are far lower than `base` in some windows, so that these were outliers, and hardly higher in any other.
     fn settles(&self, mine: &[f64], base: &[f64]) -> bool {
         settles(mine, base, outlying(self.weights.holdout.typical, self.is_typically_noise()))
     }
 
-    /// Factor by which the gap that is left widens the prior variance of the parameters; 1 where the gap is explained.
+    /// Factor by which the prior variances of the parameters are widened, because the gap that the current model leaves biases the fitted parameters;
+    /// 1 where the gap is explained.
     pub fn prior_inflation(&self) -> f64 {
         if self.is_open() { inflation(self.relative_error()) } else { 1.0 }
     }
 
-    /// Whether an effect is accepted as a cause of a gap of this size: an error of the integrator, which resembles a shift in time or a stiff shaft,
-    /// may make a small gap.
+    /// Whether an effect can be told from errors of the numerical integrator at the size of the node's gap. In a gap below `RELEVANT`, an effect
+    /// whose first parameter is a time or a shaft stiffness (delay, lag, joint elasticity) cannot: such errors resemble a shift in time or a stiff
+    /// shaft.
     pub fn shows(&self, effect: Option<&EffectInstance>) -> bool {
         self.relative_error() > RELEVANT
             || effect.is_some_and(|e| {
@@ -149,7 +167,8 @@ impl<const N: usize, const P: usize> SearchNode<N, P> {
     }
 }
 
-/// Whether the window costs `mine` are lower than `base` by more than `least` in some windows and hardly higher in any.
+/// Whether the window costs `mine` are lower than `base` by more than `least`, summed over the windows that improve, and hardly higher, summed over
+/// the others.
 fn settles(mine: &[f64], base: &[f64], least: f64) -> bool {
     let gains = || base.iter().zip(mine).map(|(b, m)| b - m);
     let gain: f64 = gains().filter(|g| *g > 0.0).sum();
@@ -157,8 +176,8 @@ fn settles(mine: &[f64], base: &[f64], least: f64) -> bool {
     gain > least && -loss < HARMLESS * gain
 }
 
-/// Least decrease of the cost of outlying windows beside windows of the cost `typical`. The cost of noise is a sum of squares, whose variance is twice
-/// its mean; what a model lacks scatters by as much as it costs.
+/// Least decrease of the summed cost of windows that counts as an explanation of outliers, among windows of the typical cost `typical`. The cost of
+/// noise is a sum of squares, whose variance is twice its mean; the cost of unmodelled torques scatters by as much as its mean.
 fn outlying(typical: f64, is_noise: bool) -> f64 {
     OUTLYING * if is_noise { (2.0 * typical).sqrt() } else { typical }
 }
@@ -166,15 +185,16 @@ fn outlying(typical: f64, is_noise: bool) -> f64 {
 /// Ground on which a candidate is accepted as a cause.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ground {
-    /// The candidate moves predictions closer to the measurement.
+    /// Predictions with the candidate are closer to the measured positions.
     Motion,
-    /// The candidate brings the parameters back to their prior values.
+    /// Fitted parameters that were implausible return to their prior values with the candidate.
     Trust,
 }
 
-/// Index of the accepted candidate and the ground for it, if any is accepted; friction regularisation is accepted unless `regularised` before.
+/// Index of the candidate that is accepted as a cause at a search node, and the ground of its acceptance; none if no candidate is accepted. Friction
+/// regularisation (a candidate without an effect) may be accepted unless friction is `regularised` already.
 ///
-/// Improvements below `min_relevance`, relative to the motion, do not count.
+/// RMS improvements of the predictions below `min_relevance`, relative to the motion within a window, do not count.
 pub fn choose<const N: usize, const P: usize>(
     node: &SearchNode<N, P>,
     regularised: bool,
@@ -192,7 +212,8 @@ pub fn choose<const N: usize, const P: usize>(
         .map(|index| (index, Ground::Trust))
 }
 
-/// The best candidate whose values are possible; a candidate with a value at its bound gives way to one that does almost as well without.
+/// Index of the candidate of lowest cost, or, if its effect is idle or at its largest size, of the next one that lowers the cost almost as much and
+/// is neither; none if there is none. Friction regularisation (a candidate without an effect) is left out if friction is `regularised` already.
 pub fn best<const N: usize, const P: usize>(node: &SearchNode<N, P>, regularised: bool) -> Option<usize> {
     let open = |i: &usize| node.candidates[*i].effect.is_some() || !regularised;
     let first = (0..node.candidates.len()).find(open)?;
@@ -201,13 +222,13 @@ pub fn best<const N: usize, const P: usize>(node: &SearchNode<N, P>, regularised
     (first..node.candidates.len()).filter(as_good).find(|i| is_possible(&node.candidates[*i]))
 }
 
-/// Whether a candidate's effect is neither idle nor at the largest size.
+/// Whether the fitted size of a candidate's effect is neither idle (near zero, for an effect with a threshold) nor the largest that the fit allows.
 pub fn is_possible<const P: usize>(candidate: &Candidate<P>) -> bool {
     candidate.size < AT_BOUND && !candidate.is_idle()
 }
 
-/// The candidate with the fewest parameters among those that do almost as well as candidate `best`: a spring with a far-off rest position is an
-/// offset, and a hysteresis over next to no path is regularised friction.
+/// Index of the candidate with the fewest parameters among those that lower the cost almost as much as candidate `best`: a spring with a far-off rest
+/// position is a torque offset, and a hysteresis over a very short path is regularised friction.
 fn simplest<const N: usize, const P: usize>(
     node: &SearchNode<N, P>,
     best: usize,
@@ -229,14 +250,14 @@ fn simplest<const N: usize, const P: usize>(
 struct Offer {
     /// Decrease of the cost by the candidate.
     advantage: f64,
-    /// Number of the candidate's values beyond the arm's parameters; zero if the candidate is not to be chosen for its simplicity.
+    /// Number of free values that the candidate adds to the arm's parameters; zero if the candidate is not to be chosen for its simplicity.
     values: usize,
-    /// Whether the candidate would be accepted by itself.
+    /// Whether the candidate by itself meets the acceptance criteria on predicted motion.
     moves: bool,
 }
 
-/// Index of the candidate (`offers`) with the fewest values, the first of several, among those that are accepted by themselves and reach more than
-/// the part `almost` of the advantage of candidate `best`.
+/// Index in `offers` of the candidate with the fewest values, the first of several, among those that are accepted by themselves and lower the cost by
+/// more than `almost` times the decrease by candidate `best`.
 fn fewest_values(offers: &[Offer], best: usize, almost: f64) -> usize {
     let Offer { advantage, values, .. } = offers[best];
     if values == 0 {
@@ -247,14 +268,15 @@ fn fewest_values(offers: &[Offer], best: usize, almost: f64) -> usize {
     (0..offers.len()).filter(as_good).min_by_key(|i| (offers[*i].values, *i)).unwrap_or(best)
 }
 
-/// Number of a candidate's free values beyond the arm's parameters: those of its effect, or one for the width of friction regularisation while that
-/// is open. Zero of a candidate that is not to be chosen for its simplicity.
+/// Number of free values that a candidate adds to the arm's parameters: those of its effect, or one for the width of friction regularisation unless
+/// friction is `regularised` already. Zero for a candidate that is not to be chosen for its simplicity.
 fn free_values<const P: usize>(candidate: &Candidate<P>, regularised: bool) -> usize {
     let width = usize::from(!regularised && candidate.fit.hypothesis.is_rounded());
     candidate.effect.as_ref().map_or(width, EffectInstance::len)
 }
 
-/// Whether a candidate closes a part of the gap that matters, on the holdout too.
+/// Whether a candidate meets the acceptance criteria on predicted motion: it removes a considerable share of the gap, improves the RMS error by more
+/// than `min_relevance` (relative to the motion within a window), and is significant on all windows and on the holdout alone.
 pub fn moves<const N: usize, const P: usize>(
     node: &SearchNode<N, P>,
     candidate: &Candidate<P>,
@@ -273,7 +295,8 @@ pub fn moves<const N: usize, const P: usize>(
         && (is_certain(node, candidate, certain) || node.settles_outliers(candidate))
 }
 
-/// Whether a candidate's advantage exceeds the windows' scatter, by `certain` standard errors on all windows, and on the holdout alone too.
+/// Whether the mean decrease of the windows' cost by a candidate is significant: more than `certain` standard errors on all windows, and more than
+/// `HOLDOUT_CERTAIN` on the holdout alone.
 fn is_certain<const N: usize, const P: usize>(
     node: &SearchNode<N, P>,
     candidate: &Candidate<P>,
@@ -282,7 +305,7 @@ fn is_certain<const N: usize, const P: usize>(
     candidate.z_over(&node.base) > certain && candidate.holdout_z_over(&node.base) > HOLDOUT_CERTAIN
 }
 
-/// Whether friction regularisation, a nuisance that is never named, explains most of the gap.
+/// Whether a candidate with friction regularisation, a nuisance that is never named, explains most of the gap with sufficient certainty.
 pub fn is_regularisation<const N: usize, const P: usize>(
     node: &SearchNode<N, P>,
     candidate: &Candidate<P>,
@@ -290,12 +313,14 @@ pub fn is_regularisation<const N: usize, const P: usize>(
     node.share(candidate) > MOST && is_certain(node, candidate, CERTAIN_ENOUGH)
 }
 
-/// Whether a candidate is accepted for bringing implausible parameters back to their prior values by one effect.
+/// Whether a candidate adds an effect with which fitted parameters that were implausible return towards their prior values, which is a ground to
+/// accept it.
 pub fn restores<const N: usize, const P: usize>(node: &SearchNode<N, P>, candidate: &Candidate<P>) -> bool {
     candidate.effect.is_some() && brings_back(node, candidate)
 }
 
-/// Whether a candidate brings implausible parameters back towards their prior values, at no cost.
+/// Whether the fitted parameters are implausibly far from their prior values without a candidate and much closer to them with it (prior cost lower by
+/// more than `TRUST_GAIN` and below 0.4 times), while the total cost falls.
 pub fn brings_back<const N: usize, const P: usize>(
     node: &SearchNode<N, P>,
     candidate: &Candidate<P>,
@@ -307,7 +332,8 @@ pub fn brings_back<const N: usize, const P: usize>(
         && candidate.score() < node.base.score()
 }
 
-/// Factor by which an unexplained gap `relative_error`, relative to the motion, widens the prior variance of the parameters.
+/// Factor by which the prior variances of the parameters are widened where a gap remains unexplained; `relative_error` is the RMS prediction error
+/// relative to the motion within a window.
 fn inflation(relative_error: f64) -> f64 {
     1.0 + (relative_error / MOVES_A_SIGMA).powi(2)
 }
@@ -356,7 +382,7 @@ mod tests {
     fn a_large_gap_may_have_moved_the_parameters_by_itself() {
         assert!((inflation(0.001) - 1.0).abs() < 0.01);
         assert_eq!(inflation(MOVES_A_SIGMA), 2.0);
-        // A distance of 70 squared standard deviations is evidence beside a gap of 2 % of the motion, and none beside one of 10 %.
+        // A prior cost of 70 is evidence where the gap is 2 % of the motion, and none where it is 10 %.
         assert!(70.0 / inflation(0.02) > TRUST_GAIN && 70.0 / inflation(0.1) < TRUST_GAIN);
     }
 }

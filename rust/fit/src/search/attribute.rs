@@ -1,4 +1,4 @@
-//! One node of the model search: candidate effects are screened, those that pass are fitted in full, and the holdout decides.
+//! One node (step) of the model search: candidate effects are screened by score tests, those that pass are fitted in full, and the holdout decides.
 
 use crate::candidates::screen::ScoreTest;
 use crate::likelihood::context::{DiagnosisContext, SplitWeighting};
@@ -13,28 +13,32 @@ use armgap_core::effect::{MAX_PARAMETERS, Quantity, Trial, catalogue, find};
 use armgap_core::transmission::Sides;
 use rayon::prelude::*;
 
-/// Number of further places of encoder and friction, on motor or link, from which the best elastic joint or backlash is fitted again.
+/// Number of further arrangements of encoder and friction (each on the motor's or the link's side of the transmission) with which the best candidate
+/// is fitted again if its effect is joint elasticity or backlash.
 const OTHER_SIDES: usize = 2;
 
-/// Candidates that are fitted again under window weights of the best candidate's residual.
+/// Number of candidates of lowest cost that are fitted again under window weights made from the best candidate's residual.
 const FINALISTS: usize = 4;
 
-/// Candidates that are fitted with their own Jacobian before the finalists are chosen.
+/// Number of candidates of lowest cost that are fitted with their own Jacobian before the finalists (fitted to the end) are chosen.
 const TAKEN_ON: usize = 2 * FINALISTS;
 
-/// Rounds at most in which the finalists are fitted under window weights of the best candidate's residual.
+/// Largest number of rounds in which the finalists (candidates of lowest cost) are fitted under window weights made from the best candidate's
+/// residual.
 const MAX_REWEIGHTINGS: usize = 3;
 
-/// Factor below which a decrease of the residual's scale requires no new window weights.
+/// Ratio of the residual's scale (standard deviation) in the window weights to that under the best candidate, up to which the weights are kept.
 const SHRUNK: f64 = 1.15;
 
-/// Squared sigmas above the lowest prior cost within which candidates become finalists for their prior cost.
+/// Largest difference between a candidate's prior cost (squared distance of the parameters from the arm file's values, in sigmas) and the lowest one
+/// at which the candidate is fitted to the end for its prior cost.
 const TRUSTED: f64 = 10.0;
 
-/// Size of an effect relative to the largest possible below which nothing is left of the effect.
+/// Size of an effect, relative to the largest size that a fit allows, below which the effect has vanished.
 const IDLE: f64 = 2e-5;
 
-/// Initial guess, relative to the typical size, of a parameter that a simpler law does not have.
+/// Initial guess, relative to its typical size, of the parameter that an effect has beyond those of its simplest case (a hardening spring beyond a
+/// linear one).
 const LITTLE: f64 = 0.1;
 
 /// An alternative to the current model, fitted on the training windows and judged on the holdout.
@@ -42,26 +46,27 @@ const LITTLE: f64 = 0.1;
 pub struct Candidate<const P: usize> {
     /// The added effect; none for the current model, with or without friction regularisation.
     pub effect: Option<EffectInstance>,
-    /// Deviation of the added effect's first parameter from neutral, relative to the largest possible.
+    /// Deviation of the added effect's first parameter from its neutral value, relative to the largest deviation that a fit allows.
     pub size: f64,
     /// Fit of the alternative to the training windows.
     pub fit: Fit<P>,
-    /// Student-t cost of every training window.
+    /// Student-t (robust) cost of every training window under the fit.
     pub training: Vec<f64>,
-    /// Student-t cost of every holdout window.
+    /// Student-t (robust) cost of every holdout window under the fit.
     pub holdout: Vec<f64>,
-    /// Squared error of the holdout windows without robust weights, but for the worst few windows.
+    /// Sum of squared prediction errors of the holdout windows, in units of the residual's scale, without robust weights and without the worst few
+    /// windows.
     pub error: f64,
 }
 
 impl<const P: usize> Candidate<P> {
-    /// Cost on all training and holdout windows plus the prior cost.
+    /// Total cost: Student-t costs of all training and holdout windows plus the prior cost of the parameters.
     pub fn score(&self) -> f64 {
         self.training.iter().chain(&self.holdout).sum::<f64>() + self.fit.prior_cost
     }
 
-    /// Whether the candidate's effect, of those tested by their whole change of the predictions, has a size near zero, so that its other parameters
-    /// have no meaning.
+    /// Whether the candidate's effect is one with a threshold (`Trial::Whole`) whose fitted size is near zero, so that its other parameters have no
+    /// meaning.
     pub fn is_idle(&self) -> bool {
         self.effect.is_some_and(|e| e.law.spec().trial == Trial::Whole) && self.size < IDLE
     }
@@ -75,18 +80,18 @@ impl<const P: usize> Candidate<P> {
         }
     }
 
-    /// Decrease of the cost of every window beside candidate `other`, training windows first.
+    /// Cost of every window under candidate `other` minus its cost under this candidate, training windows first.
     pub fn advantages(&self, other: &Self) -> Vec<f64> {
         let here = self.training.iter().chain(&self.holdout);
         other.training.iter().chain(&other.holdout).zip(here).map(|(b, a)| b - a).collect()
     }
 
-    /// Mean advantage over candidate `other` per window, in units of its standard error.
+    /// Mean decrease of the windows' cost from candidate `other` to this candidate, in units of the mean's standard error.
     pub fn z_over(&self, other: &Self) -> f64 {
         z_score(&self.advantages(other))
     }
 
-    /// Mean advantage over candidate `other` per holdout window, in units of its standard error.
+    /// Mean decrease of the holdout windows' cost from candidate `other` to this candidate, in units of the mean's standard error.
     pub fn holdout_z_over(&self, other: &Self) -> f64 {
         z_score(&self.advantages(other)[self.training.len()..])
     }
@@ -100,19 +105,20 @@ fn z_score(x: &[f64]) -> f64 {
     mean / (variance / n).sqrt().max(1e-12)
 }
 
-/// A node of the model search: the current model and its candidates, under common window weights.
+/// One node (step) of the model search: the current model and the candidates to extend it, fitted under common window weights.
 #[derive(Debug, Clone)]
 pub struct SearchNode<const N: usize, const P: usize> {
-    /// The current model, fitted under window weights of its own residual.
+    /// The current model, fitted under window weights made from its own residual.
     pub settled: Fit<P>,
     /// The current model, fitted under the weights common to all candidates.
     pub base: Candidate<P>,
-    /// Alternatives to the current model, best first.
+    /// Alternatives to the current model that were fitted to the end, lowest cost first.
     pub candidates: Vec<Candidate<P>>,
-    /// Every candidate that was fitted, with the share of the gap it removes under the current model's own weights, best first.
+    /// Every candidate effect that was fitted, lowest cost first, with the share of the gap that it removes under the current model's own window
+    /// weights.
     pub field: Vec<(Candidate<P>, f64)>,
-    /// First-order tests of all candidates around the settled model, the open ones first; empty if they were made under other weights than the node
-    /// has.
+    /// Score tests (first-order) of all candidate effects around the model `settled`, those not in the model first; empty if the node's window
+    /// weights were changed after the tests.
     pub screened: Vec<ScoreTest>,
     /// Weights of the training and holdout windows, common to all candidates.
     pub weights: SplitWeighting<N>,
@@ -122,11 +128,11 @@ pub struct SearchNode<const N: usize, const P: usize> {
     pub motion: f64,
 }
 
-/// The finalists and the current model after the last round of re-weighting.
+/// The finalists (best candidates, fitted to the end) and the current model after the last round of re-weighting the windows.
 struct FinalRound<const N: usize, const P: usize> {
     base: Candidate<P>,
     candidates: Vec<Candidate<P>>,
-    /// Window weights under the best candidate; none if they are those that the candidates were compared under before.
+    /// Window weights made from the best candidate's residual; none if the window weights were not changed.
     weights: Option<SplitWeighting<N>>,
 }
 
@@ -138,27 +144,28 @@ impl<const N: usize, const P: usize> SearchNode<N, P> {
         (base - here) / (base - self.floor).max(1e-9 * base)
     }
 
-    /// RMS improvement of a candidate on the holdout, relative to the motion within the windows.
+    /// RMS improvement of the predictions by a candidate on the holdout, relative to the RMS motion within the windows.
     pub fn relevance(&self, candidate: &Candidate<P>) -> f64 {
         ((self.base.error - candidate.error).max(0.0) / self.motion).sqrt()
     }
 
-    /// RMS error of the current model on the holdout, relative to the motion within the windows.
+    /// RMS prediction error of the current model on the holdout, relative to the RMS motion within the windows.
     pub fn relative_error(&self) -> f64 {
         (self.base.error / self.motion).sqrt()
     }
 
-    /// Whether the current model leaves a gap of consequence above the noise floor.
+    /// Whether the current model leaves a gap of consequence whose cost exceeds the noise floor by more than the factor `ABOVE_FLOOR`.
     pub fn is_open(&self) -> bool {
         self.relative_error() > CONSEQUENTIAL_ERROR && self.excess() > ABOVE_FLOOR
     }
 
-    /// Whether the current model leaves a gap of consequence that is more than noise.
+    /// Whether the current model leaves a gap of consequence whose cost exceeds the noise floor by more than the factor `UNEXPLAINED`.
     pub fn is_unexplained(&self) -> bool {
         self.relative_error() > CONSEQUENTIAL_ERROR && self.excess() > UNEXPLAINED
     }
 
-    /// Whether the current model leaves a gap above the noise floor large enough for an improvement of `min_relevance`, relative to the motion.
+    /// Whether the current model leaves a gap above the noise floor and large enough for a further effect to improve the predictions by
+    /// `min_relevance` (RMS, relative to the motion within a window).
     pub fn is_worth_more(&self, min_relevance: f64) -> bool {
         self.relative_error() > min_relevance && self.excess() > ABOVE_FLOOR
     }
@@ -170,13 +177,14 @@ impl<const N: usize, const P: usize> SearchNode<N, P> {
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// The search node around the model `current`; improvements below `min_relevance`, relative to the motion, are not looked for.
+    /// The search node around the model `current`, settled from the residual scales `scale`, rad or m; candidates are fitted to a gap only if it is
+    /// larger than `min_relevance` (RMS, relative to the motion within a window).
     pub fn node(&self, current: &Hypothesis<P>, scale: [f64; N], min_relevance: f64) -> SearchNode<N, P> {
         self.node_around(self.settle(current, scale), min_relevance)
     }
 
-    /// The search node around a fit under weights of its own residual; improvements below `min_relevance`, relative to the motion, are not looked
-    /// for.
+    /// The search node around a fit under window weights of its own residual; candidates are fitted to a gap only if it is larger than
+    /// `min_relevance` (RMS, relative to the motion within a window).
     pub fn node_around(
         &self,
         (fit, weights): (Fit<P>, SplitWeighting<N>),
@@ -205,14 +213,14 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         self.duel(SearchNode { settled: fit, base, candidates, field, screened, weights, floor, motion })
     }
 
-    /// Deviation of an effect's first parameter from neutral, relative to the largest possible.
+    /// Deviation of an effect's first parameter from its neutral value, relative to the largest deviation that a fit allows.
     fn relative_size(&self, effect: &EffectInstance) -> f64 {
         let parameter = &effect.law.spec().parameters[0];
         let centre = self.scales.centre(parameter, effect.joint);
         (effect.p[0] - centre).abs() / self.scales.largest(parameter.quantity, effect.joint)
     }
 
-    /// All fitted candidates that add an effect, with the share of the gap each removes.
+    /// All fitted candidates that add an effect, each with the share of the gap above the noise floor that it removes under the given window weights.
     fn field(
         &self,
         weights: &SplitWeighting<N>,
@@ -225,8 +233,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         fitted.iter().filter(|c| c.effect.is_some()).map(|c| (c.clone(), share(c))).collect()
     }
 
-    /// Fits all initial guesses and judges them, best first; `jacobian` is that of the model `base` they add to, where it is known. Candidates that
-    /// diverged or whose effect vanished are left out.
+    /// Candidates fitted from all initial guesses and judged on the holdout, lowest cost first, without those that diverged or whose effect vanished;
+    /// `jacobian` is that of the model `base` that the guesses extend, empty where it is not known.
     pub(crate) fn fit_candidates(
         &self,
         weights: &SplitWeighting<N>,
@@ -241,7 +249,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         ranked(initial_guesses.into_par_iter().map(fitted).collect())
     }
 
-    /// The candidates in order of cost, after a fit of the best ones with their own Jacobian where they have reused columns of the model `base`.
+    /// The candidates in order of cost, after the best `TAKEN_ON` are fitted again with their own Jacobian if their first fit reused columns of the
+    /// Jacobian of the model `base`.
     fn taken_on(
         &self,
         weights: &SplitWeighting<N>,
@@ -256,7 +265,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         ranked(candidates.into_par_iter().enumerate().map(on).collect())
     }
 
-    /// Fits an initial guess and judges it; the effect behind the first `known` ones is the one under test.
+    /// Candidate fitted from an initial guess to the training windows and judged on the holdout; the effect under test follows the first `known`
+    /// effects of the model.
     pub(crate) fn candidate(
         &self,
         weights: &SplitWeighting<N>,
@@ -265,7 +275,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         effort: Effort,
         jacobian: &[Vec<f64>],
     ) -> Candidate<P> {
-        // Where an effect starts at neutral, the Jacobian of the model without it is nearly its own.
+        // Where the effect under test is near its neutral value, the Jacobian of the model without the effect is nearly that of the model with it.
         let near = initial_guess.effects.get(known).is_some_and(|e| e.law.spec().trial != Trial::Whole);
         let jacobian = if near { jacobian } else { &[] };
         let fit = self.problem(&weights.training).solve_reusing(initial_guess, effort, jacobian);
@@ -318,8 +328,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         FinalRound { base, candidates, weights: heavier }
     }
 
-    /// Alternatives to a candidate whose effect is a transmission: encoder and friction on other sides that they may be on, those that explain the
-    /// training windows best before another fit.
+    /// Alternatives to a candidate whose effect is a transmission (joint elasticity, backlash): the same model with encoder and friction on other
+    /// possible sides of the transmission, those of lowest cost on the training windows before they are fitted.
     fn other_sides(&self, candidate: &Candidate<P>, weights: &SplitWeighting<N>) -> Vec<Hypothesis<P>> {
         let Some(effect) = candidate.effect.filter(|effect| effect.law.has_transmission()) else {
             return Vec::new();
@@ -346,7 +356,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     }
 }
 
-/// Candidates ordered by cost, none twice, without those that diverged or whose effect vanished.
+/// Candidates in order of cost, lowest first, every effect and joint once, without those that diverged or whose effect vanished.
 fn ranked<const P: usize>(mut candidates: Vec<Candidate<P>>) -> Vec<Candidate<P>> {
     candidates.retain(|c| c.score().is_finite() && !c.is_idle());
     candidates.sort_by(|a, b| a.score().total_cmp(&b.score()));
@@ -359,7 +369,8 @@ fn ranked<const P: usize>(mut candidates: Vec<Candidate<P>>) -> Vec<Candidate<P>
     best
 }
 
-/// Hypotheses to be fitted to the end: the best candidates by cost below `hopeless`, and the best by prior cost.
+/// Hypotheses to be fitted to the end: those of the candidates of lowest cost, if below the cost `hopeless`, and those of the candidates of lowest
+/// prior cost.
 fn finalists<const P: usize>(candidates: &[Candidate<P>], hopeless: f64) -> Vec<Hypothesis<P>> {
     let mut by_trust: Vec<usize> = (0..candidates.len()).collect();
     let prior = |i: &usize| candidates[*i].fit.prior_cost;
@@ -384,7 +395,8 @@ fn with_law<const P: usize>(
     (!model.effects.iter().any(taken)).then(|| Hypothesis { theta, ..model.with(law) })
 }
 
-/// The model with the simpler law that a candidate's effect becomes when its first parameter vanishes; none if it has no simpler law.
+/// The model with the simpler effect that a candidate's effect becomes when its first parameter vanishes (a linear spring for a hardening one); none
+/// if there is no simpler one.
 fn simpler<const P: usize>(model: &Hypothesis<P>, candidate: &Candidate<P>) -> Option<Hypothesis<P>> {
     let effect = candidate.effect?;
     let law = find::<f64>(effect.law.simpler()?)?;
@@ -397,7 +409,8 @@ fn simpler<const P: usize>(model: &Hypothesis<P>, candidate: &Candidate<P>) -> O
     with_law(model, candidate, EffectInstance::new(law, effect.joint, p))
 }
 
-/// The model with the law of which a candidate's effect is the simplest case, and a small value of the parameter that the simple law does not have.
+/// The model with the effect of which a candidate's effect is the simplest case (a hardening spring for a linear one), at a small value of the
+/// additional parameter; none if there is no such effect.
 fn richer<const N: usize, const P: usize>(
     model: &Hypothesis<P>,
     candidate: &Candidate<P>,

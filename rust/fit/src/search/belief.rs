@@ -1,4 +1,4 @@
-//! Selection probability of a cause: how often it is preferred when the windows are drawn again.
+//! Selection probability of a cause: how often the cause has the lowest cost of all candidates on bootstrap resamples of the windows.
 
 use crate::model::hypothesis::EffectInstance;
 use crate::numeric::random::Random;
@@ -20,9 +20,9 @@ pub struct Cause {
     pub probability: f64,
     /// Share of the holdout's gap above the noise floor that the cause removed when it was added.
     pub share: f64,
-    /// RMS improvement on the holdout by the cause when it was added, relative to the motion.
+    /// RMS improvement of the predictions on the holdout by the cause when it was added, relative to the RMS motion within the windows.
     pub relevance: f64,
-    /// Effects that these logs do not tell from the cause.
+    /// Effects that the logs of the diagnosis cannot distinguish from the cause.
     pub look_alikes: Vec<EffectInstance>,
     /// Figures from which the probability of the cause follows.
     pub evidence: Evidence,
@@ -31,7 +31,7 @@ pub struct Cause {
 }
 
 impl<const N: usize, const P: usize> SearchNode<N, P> {
-    /// Whether no log of motion tells the effects of candidates `a` and `b` apart.
+    /// Whether the effects of the candidates with indices `a` and `b` give the same motion under any torques, so that no log distinguishes them.
     fn are_equivalent(&self, a: usize, b: usize) -> bool {
         match (self.candidates[a].effect, self.candidates[b].effect) {
             (Some(a), Some(b)) => equivalent::are(&a, &b, N),
@@ -40,7 +40,7 @@ impl<const N: usize, const P: usize> SearchNode<N, P> {
     }
 }
 
-/// The candidate of index `choice` as a cause, with its look-alikes and probability.
+/// The node's candidate of index `choice` as a cause, with its look-alikes and probability.
 pub fn name<const N: usize, const P: usize>(
     node: &SearchNode<N, P>,
     choice: usize,
@@ -75,8 +75,8 @@ pub fn name<const N: usize, const P: usize>(
     }
 }
 
-/// Probability that the candidate `choice`, one of its look-alikes `listed`, or one that no motion tells from it, has the lowest cost when the
-/// windows are drawn again.
+/// Share of bootstrap resamples of the windows on which the lowest cost is that of the candidate `choice`, of one of its look-alikes `listed`, or of
+/// an effect that gives the same motion under any torques.
 fn probability<const N: usize, const P: usize>(
     node: &SearchNode<N, P>,
     choice: usize,
@@ -85,7 +85,7 @@ fn probability<const N: usize, const P: usize>(
 ) -> f64 {
     let advantages: Vec<Vec<f64>> = node.candidates.iter().map(|c| c.advantages(&node.base)).collect();
     let own: Vec<f64> = node.candidates.iter().map(|c| node.base.fit.prior_cost - c.fit.prior_cost).collect();
-    // A law with more values that does no better is no evidence against one with fewer.
+    // An effect with more free values that explains the windows no better is no evidence against one with fewer.
     let size = |i: usize| node.candidates[i].effect.as_ref().map_or(0, EffectInstance::len);
     let richer =
         |i: usize| size(i) > size(choice) && node.is_alike(&node.candidates[choice], &node.candidates[i]);
@@ -104,7 +104,7 @@ fn probability<const N: usize, const P: usize>(
     (f64::from(wins) + 0.5) / (RESAMPLES as f64 + 1.0)
 }
 
-/// Probability that one candidate has a lower cost than another when the windows are drawn again.
+/// Share of bootstrap resamples of the windows on which candidate `one` has a lower cost than candidate `other`.
 pub fn probability_over<const P: usize>(one: &Candidate<P>, other: &Candidate<P>, seed: u64) -> f64 {
     let advantages = one.advantages(other);
     let own = other.fit.prior_cost - one.fit.prior_cost;
@@ -116,13 +116,13 @@ pub fn probability_over<const P: usize>(one: &Candidate<P>, other: &Candidate<P>
     (wins as f64 + 0.5) / (RESAMPLES as f64 + 1.0)
 }
 
-/// Probability of the candidate `choice`, or one that no motion tells from it, among all effects that would restore the prior values of the
-/// parameters, from their prior costs.
+/// Probability of the effect of candidate `choice`, or one that gives the same motion under any torques, among all candidate effects, from the prior
+/// costs with each (squared distances of the parameters from their prior values, in sigmas).
 fn trust_probability<const N: usize, const P: usize>(node: &SearchNode<N, P>, choice: usize) -> f64 {
     let of = |c: &Candidate<P>| c.fit.prior_cost / node.prior_inflation();
     let best = of(&node.candidates[choice]);
     let free = |c: &Candidate<P>| c.effect.as_ref().map_or(0, EffectInstance::len) as f64;
-    // Every value of its own takes one squared sigma of the distance off by chance.
+    // Every free value of an effect lowers the prior cost by one squared sigma by chance.
     let mass = |c: &Candidate<P>| (-0.5 * (of(c) + free(c) - best)).exp();
     let (mut ours, mut all) = (0.0, 0.0);
     for (i, candidate) in node.candidates.iter().enumerate() {
@@ -134,17 +134,17 @@ fn trust_probability<const N: usize, const P: usize>(node: &SearchNode<N, P>, ch
             ours += mass(candidate);
         }
     }
-    // What is left over by the best effect must itself be plausible, or the values are simply wrong.
+    // The prior cost that remains with the best effect must itself be plausible, or the arm file's values are simply wrong.
     let plausible = (-0.5 * (best - P as f64).max(0.0) / (2.0 * P as f64).sqrt()).exp();
     (ours / all) * plausible
 }
 
-/// Share of the first node's gap that the last node leaves without explanation.
+/// Share, 0 to 1, of the gap at the first node of a model search that the model of the last node leaves unexplained.
 pub fn left_over<const N: usize, const P: usize>(nodes: &[SearchNode<N, P>]) -> f64 {
     unexplained_of(nodes.first(), nodes.last())
 }
 
-/// Share of the gap remaining after a first attribution that a second attribution leaves without explanation.
+/// Share, 0 to 1, of the gap remaining at the end of a first model search that remains at the end of a second one.
 pub fn left_beside<const N: usize, const P: usize>(
     first: &[SearchNode<N, P>],
     second: &[SearchNode<N, P>],
@@ -152,7 +152,7 @@ pub fn left_beside<const N: usize, const P: usize>(
     unexplained_of(first.last(), second.last())
 }
 
-/// Share of an earlier node's gap that is left at a last node; zero where no more than noise is left.
+/// Share, 0 to 1, of the gap at search node `earlier` that remains at search node `last`; zero where no more than noise remains.
 fn unexplained_of<const N: usize, const P: usize>(
     earlier: Option<&SearchNode<N, P>>,
     last: Option<&SearchNode<N, P>>,
@@ -164,17 +164,17 @@ fn unexplained_of<const N: usize, const P: usize>(
     left_of(earlier, last)
 }
 
-/// Share of an earlier node's gap that is left at a last node, 0 to 1.
+/// Share, 0 to 1, of the gap at search node `earlier` that remains at search node `last`, without regard to noise.
 fn left_of<const N: usize, const P: usize>(earlier: &SearchNode<N, P>, last: &SearchNode<N, P>) -> f64 {
-    // As it is, the error may be that of one window that ran away; with its tail cut, it is that of all of them. Where it is of no
-    // consequence by itself, both must say so.
+    // The squared error may be that of one diverged window; the robust (Student-t) cost is that of all windows. The larger of the two ratios counts
+    // where the remaining gap is of consequence, the smaller one elsewhere.
     let as_it_is = (last.relative_error() / earlier.relative_error()).powi(2);
     let cut = last.excess() / earlier.excess();
     let left = if last.is_open() { as_it_is.max(cut) } else { as_it_is.min(cut) };
     left.min(1.0)
 }
 
-/// Factor on the probability of a cause beside a share `left` of the gap that nothing explains: one for none, `least` for all of it.
+/// Factor on a probability where the share `left` of the gap remains unexplained: one if nothing remains, `least` if all of the gap does.
 pub fn belief_beside(left: f64, least: f64) -> f64 {
     least + (1.0 - least) * (1.0 - left).powi(REMAINDER_POWER)
 }

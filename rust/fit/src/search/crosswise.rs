@@ -1,8 +1,8 @@
-//! Interleaved cross-validation, for training logs that do not show what the holdout does.
+//! Interleaved cross-validation, for training logs that do not excite an effect which the holdout excites.
 //!
-//! A stop that only the motion of the holdout reaches, a spring that differs from friction only at the holdout's speeds: no effect fitted to the
-//! training logs explains such a gap, and judged on both sets of logs, the right effect is worth nothing. So where a diagnosis ends with a gap, every
-//! log is cut into stretches, of which every other one is fitted to and the rest judged on. Both kinds of motion are then in both sets, and what
+//! A joint limit may be reached only by the motion of the holdout, and a spring may differ from friction only at the holdout's speeds. No effect
+//! fitted to the training logs explains such a gap, so that even the right effect is not accepted. So where a diagnosis ends with a gap, every log is
+//! cut into stretches, of which every other one is fitted to and the rest judged on. Both kinds of motion are then in both sets, and an effect that
 //! explains nearly all of the gap has been judged on stretches that it was not fitted to.
 
 use crate::likelihood::context::DiagnosisContext;
@@ -13,24 +13,26 @@ use crate::search::belief::left_over;
 use crate::search::model_search::Attribution;
 use armgap_core::arm::Arm;
 
-/// Stretches that interleaved cross-validation cuts a log into, if the log is long enough.
+/// Number of stretches into which interleaved cross-validation cuts a log, if the log is long enough.
 const STRETCHES: usize = 6;
 
-/// Fewest windows in a stretch of a log.
+/// Least number of windows in a stretch of a log that interleaved cross-validation cuts.
 const WINDOWS: usize = 4;
 
-/// Part of the first gap that may be left for an attribution by interleaved cross-validation to count.
+/// Largest share of the gap before any cause that may remain for the causes found by interleaved cross-validation to be accepted.
 const LEFT: f64 = 0.1;
 
-/// Ratio of costs in noise floors, interleaved over plain cross-validation, below which an interleaved attribution counts although a gap remains.
+/// Ratio of the final costs in units of their noise floors, of a model search on interleaved stretches over one on the logs as given, below which the
+/// causes of the interleaved search are accepted although a gap remains.
 const MUCH_LESS: f64 = 0.1;
 
-/// Ratio of mean square errors, holdout to training logs, above which the holdout shows what the training logs do not.
+/// Ratio of the final model's mean square prediction errors, holdout over training logs, above which the holdout shows an effect that the training
+/// logs do not.
 const MORE: f64 = 2.0;
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// Whether a search ended with a much larger prediction error on the holdout than on the training logs: only then can interleaved
-    /// cross-validation tell more than the logs as they are.
+    /// Whether a model search ended with a much larger prediction error on the holdout than on the training logs: only then can interleaved
+    /// cross-validation find more than the logs as they are divided.
     pub(crate) fn holdout_shows_more(&self, attribution: &Attribution<N, P>) -> bool {
         let Some(last) = attribution.nodes.last() else { return false };
         let per_row = |costs: &[f64], rows: usize| costs.iter().sum::<f64>() / rows as f64;
@@ -40,7 +42,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     }
 }
 
-/// Training and holdout stretches of logs, interleaved; none where a log is too short for two stretches.
+/// Logs cut into stretches that alternately form a new training set and a new holdout, in this order; none where a log is too short for two stretches
+/// of several windows of `horizon`, s.
 pub fn crosswise<'a>(
     training: &[LogData<'a>],
     holdout: &[LogData<'a>],
@@ -63,7 +66,7 @@ pub fn crosswise<'a>(
     Some(sides)
 }
 
-/// A stretch of a log, named by the log and its times.
+/// The samples `range` of a log as a log of its own, named by the log and the times of its first and last sample.
 fn stretch<'a>(log: &LogData<'a>, range: std::ops::Range<usize>) -> LogData<'a> {
     let joints = log.q.len() / log.t.len();
     let rows = range.start * joints..range.end * joints;
@@ -89,7 +92,7 @@ fn millis(t: f64) -> f64 {
     (t * 1e3).round() / 1e3
 }
 
-/// Whether an attribution by interleaved cross-validation explains what a plain attribution has left.
+/// Whether a model search on interleaved stretches (`crosswise`) explains the gap that the search on the logs as given (`plain`) has left.
 pub fn explains<const N: usize, const P: usize>(
     crosswise: &Attribution<N, P>,
     plain: &Attribution<N, P>,

@@ -1,9 +1,10 @@
 //! Evidence for a cause in the final model, and the probability that the cause is in the arm.
 //!
-//! A real arm always has effects that the library lacks, so an unexplained remainder of the gap is no evidence against a cause by itself. What counts
-//! is how the cause's own part compares with the remainder: an effect that is not in the arm takes up a part of the remainder, and another part under
-//! another motion. So the probability follows from three figures: how often the cause is chosen when the windows are drawn again, by how much the
-//! holdout's error rises without it, and whether fits to the holdout and to the training logs give it the same size.
+//! A real arm always has effects that the library does not have, so an unexplained remainder of the gap is no evidence against a cause by itself.
+//! What counts is how the part of the gap that the cause explains compares with the remainder: an effect that is not in the arm takes up a part of
+//! the remainder, and another part under another motion. So the probability follows from three figures: how often the cause is chosen when the
+//! windows are drawn again, by how much the holdout's error rises without it, and whether fits to the holdout and to the training logs give it the
+//! same size.
 
 use crate::likelihood::context::DiagnosisContext;
 use crate::likelihood::holdout::is_plausible;
@@ -17,30 +18,32 @@ use armgap_core::effect::Trial;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-/// Scatter of an effect's size between logs, relative to the size, that other missing effects make beside its standard deviation.
+/// Standard deviation of the ratio of an effect's sizes fitted to two logs, for an effect that is in the arm: made by other unmodelled effects, in
+/// addition to the fits' own standard deviation.
 const SAME: f64 = 0.15;
 
-/// Mean and scatter of the size of an effect that is not in the arm, as fitted to one log relative to another.
+/// Mean and standard deviation of the ratio of an effect's sizes fitted to two logs, for an effect that is not in the arm.
 const OTHER: [f64; 2] = [0.7, 0.8];
 
 /// Odds of a cause that removes as much of the gap as remains with it, and whose size the holdout neither confirms nor contradicts. Fitted to causes
-/// named on arms of another simulator (docs/decisions/034-probability-of-a-cause.md), of which most lack several effects of the library, and two of
-/// five an effect that the library does not have. With half the value the log loss on these arms grows by a fifth; with twice the value it falls by a
-/// thirtieth, but of the causes named at 0.75 to 0.9 fewer are right than claimed.
+/// named on arms of another simulator (docs/decisions/034-probability-of-a-cause.md), whose nominal models mostly omit several effects of the
+/// library, and in two of five cases an effect that the library does not have. With half the value the log loss on these arms grows by a fifth; with
+/// twice the value it falls by a thirtieth, but of the causes named at 0.75 to 0.9 fewer are right than claimed.
 const PRIOR_ODDS: f64 = 2.0;
 
-/// Power of a cause's gain in its odds, fitted as `PRIOR_ODDS` is: gains that differ by what else an arm lacks say less than their ratio. At 1 the
-/// log loss is larger by a twelfth.
+/// Exponent, in the odds of a cause, of its gain (rise of the holdout's cost without the cause), fitted as `PRIOR_ODDS` is: a gain also varies with
+/// the other unmodelled effects of an arm, so it says less than in proportion. At 1 the log loss is larger by a twelfth.
 const GAIN_POWER: f64 = 0.5;
 
-/// Power, in the odds of a cause, of the ratio of the gap left by an unnamed law (a table over one variable in place of the cause) to the gap left by
-/// the cause; fitted as `PRIOR_ODDS` is. At 1 the log loss is larger by a fifth, at 3 by a hundredth.
+/// Exponent, in the odds of a cause, of the ratio of the gap left by an unnamed law (a table over one variable in place of the cause) to the gap left
+/// by the cause; fitted as `PRIOR_ODDS` is. At 1 the log loss is larger by a fifth, at 3 by a hundredth.
 const RIVAL_POWER: i32 = 4;
 
 /// Evidence for a cause in the final model.
 #[derive(Debug, Clone, Copy, Default, JsonSchema, Serialize)]
 pub struct Evidence {
-    /// How often the cause has the lowest cost of all candidates when the windows are drawn again, at the search node where it was added, 0 to 1.
+    /// Share, 0 to 1, of bootstrap resamples of the windows on which the cause has the lowest cost of all candidates, at the search node where it was
+    /// added.
     pub selected: f64,
     /// Rise of the holdout's cost without the cause, everything else fitted again, relative to the cost above the noise floor with the cause; none
     /// where no more than noise remains.
@@ -48,17 +51,18 @@ pub struct Evidence {
     /// Standard error of the gain, from the scatter between the holdout's windows.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gain_sigma: Option<f64>,
-    /// Decrease of the holdout's cost by an unnamed law in the cause's place (the table over one variable that predicts best what the arm leaves
+    /// Decrease of the holdout's cost by an unnamed law in the cause's place (the table over one variable that best predicts the residual torque
     /// without the cause), relative to the cost above the noise floor with the cause; none where no table predicts.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rival_gain: Option<f64>,
-    /// Size of the effect as fitted to the holdout, relative to its size fitted to the training logs; none where a size has no direction.
+    /// Size of the effect as fitted to the holdout, relative to its size fitted to the training logs; none for an effect whose first parameter is no
+    /// amplitude.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_ratio: Option<f64>,
     /// Standard deviation of the size ratio.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_ratio_sigma: Option<f64>,
-    /// Odds that the encoder zeros of the recordings have a common mean that is not zero, to their scattering around zero; only for an offset of the
+    /// Odds that the encoder zeros of the recordings have a common mean that is not zero, against a scatter around zero; only for an offset of the
     /// encoder's zero and effects that are equivalent to it, and `None` where all recordings have the same zero.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub beyond_scatter: Option<f64>,
@@ -82,7 +86,7 @@ impl Evidence {
         (1.0 + gain - rival).clamp(0.0, 1.0)
     }
 
-    /// Likelihood ratio of the training and holdout sizes: effect in the arm over effect not in the arm.
+    /// Likelihood ratio, effect in the arm over effect not in the arm, of the ratio of its sizes fitted to the holdout and to the training logs.
     fn agreement(&self) -> f64 {
         let (Some(ratio), Some(sigma)) = (self.size_ratio, self.size_ratio_sigma) else { return 1.0 };
         let density = |mean: f64, scatter: f64| {
@@ -95,7 +99,7 @@ impl Evidence {
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// Computes evidence and probability of all causes of an attribution.
+    /// Computes evidence and probability of all causes that a model search has found.
     pub(crate) fn weigh(&self, attribution: &mut Attribution<N, P>) {
         let Some(last) = attribution.nodes.last() else { return };
         if attribution.causes.is_empty() {
@@ -119,7 +123,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
                 cause.evidence.gain = Some((bare - full) / rest);
                 cause.evidence.gain_sigma = Some(standard_error_of_sum(&rises) / rest);
                 if is_plausible::<P>(without.prior_cost) {
-                    // What else is in the model now has brought the values back as well: only motion can speak for the cause.
+                    // The other effects in the model keep the parameters plausible without this cause: only predicted motion can be evidence for it.
                     cause.ground = Ground::Motion;
                 }
                 let rival = self.rival_cost(&taken_out, &last.weights);
@@ -137,8 +141,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     }
 }
 
-/// Joint (from 0) whose encoder an effect makes count from another zero, and that zero, rad or m; a tilted base does the same to the first joint of
-/// an arm in a plane.
+/// Joint (from 0) whose encoder zero an effect shifts, and the shift, rad or m; a tilted base shifts that of the first joint of an arm in a plane.
+/// None for other effects.
 fn zero_of(effect: &EffectInstance) -> Option<(usize, f64)> {
     let [at_zero, at_one] = [0.0, 1.0].map(|q| effect.law.measured(&effect.p, q));
     let tilt = effect.law.tilt(&effect.p);
@@ -161,13 +165,13 @@ fn standard_error_of_sum(terms: &[f64]) -> f64 {
     (n / (n - 1.0).max(1.0) * terms.iter().map(|x| (x - mean).powi(2)).sum::<f64>()).sqrt()
 }
 
-/// Whether a search ended at a node whose cost is more than noise.
+/// Whether the holdout's cost at the last node of a model search is more than noise leaves.
 fn is_more_than_noise<const N: usize, const P: usize>(last: &SearchNode<N, P>) -> bool {
     last.excess() > if last.is_open() { ABOVE_FLOOR } else { UNEXPLAINED }
 }
 
-/// Size of effect `place` in fit `other` relative to its size in fit `of`, along the values in `of`, and the ratio's standard deviation; none for an
-/// effect whose first parameter is no amplitude.
+/// Size of the effect with index `place` in fit `other`, projected on its amplitudes in fit `of` and relative to them, and the ratio's standard
+/// deviation; none for an effect whose first parameter is no amplitude.
 fn size_ratio<const P: usize>(place: usize, of: &Fit<P>, other: &Fit<P>) -> Option<(f64, f64)> {
     let effects = &of.hypothesis.effects;
     let (one, two) = (&effects[place], &other.hypothesis.effects[place]);

@@ -1,9 +1,9 @@
 //! Friction regularisation: the widths over which the sign of friction changes around standstill, fitted as a nuisance.
 //!
 //! Dry friction jumps at standstill; the friction of many simulators, and of joints that creep, follows `tanh(dq / width)`, on every joint with a
-//! width of its own. The widths are no cause of a gap that has a name, but a model with wrong widths misses every reversal, and this error hides
-//! small causes, or takes the name of an effect that acts at reversals too. So the model with the best widths is a rival of every candidate, and of
-//! every cause that is to stay.
+//! width of its own. The widths are never named as a cause, but a model with wrong widths mispredicts every reversal, and this error hides small
+//! causes, or is attributed to an effect that acts at reversals too. So the model with the best widths is a rival of every candidate, and of every
+//! cause that is to stay.
 
 use crate::likelihood::context::{DiagnosisContext, SplitWeighting};
 use crate::likelihood::solve::{Effort, Fit, FitProblem};
@@ -18,22 +18,26 @@ use armgap_core::integrate::largest_stable_rate;
 /// Widths of friction regularisation that are tried on all joints at once, relative to the slowest joint's RMS speed.
 const WIDTHS: [f64; 7] = [0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0];
 
-/// Factors, either way, of the searches for widths of friction regularisation: the common width around the best tried, each joint's around that.
+/// Ranges of the searches for widths of friction regularisation, as factors above and below the centre: of the common width around the best of
+/// `WIDTHS`, and of each joint's width around the common one.
 const REACH: [f64; 2] = [4.0, 20.0];
 
-/// Evaluations of the cost in each search for a width: of the common width, and of one joint's own.
+/// Number of evaluations of the cost in each search for a width of friction regularisation: of the width common to all joints, and of one joint's
+/// own.
 const EVALUATIONS: [u64; 2] = [6, 7];
 
-/// Factor, either way, of a search for each joint's width around one found with other parameters, and evaluations of the cost in it.
+/// Search that refines a joint's width of friction regularisation after the parameters are fitted again: range as a factor above and below the
+/// present width, and number of evaluations of the cost.
 const REFINED: (f64, u64) = (1.5, 6);
 
-/// Largest number of times that widths are refined, with the parameters fitted between.
+/// Largest number of rounds in which the widths of friction regularisation are refined, with the parameters fitted between the rounds.
 const ROUNDS: usize = 3;
 
-/// Widths of friction regularisation by joint, rad/s or m/s, and their cost.
+/// Widths of friction regularisation by joint, rad/s or m/s, and the cost of the model with these widths.
 type Widths<const N: usize> = ([f64; N], f64);
 
-/// The widths of less cost, if any, that `joints` share within the factor `reach` of the first one's width in `best`.
+/// Widths of lowest cost with one width for all of `joints`, within the factor `reach` above and below the first of these joints' width in `best`;
+/// `best` itself if none has a lower cost.
 fn nearby<const N: usize>(
     cost: &impl Fn([f64; N]) -> f64,
     best: Widths<N>,
@@ -52,7 +56,8 @@ fn nearby<const N: usize>(
     found.filter(|(_, reached)| *reached < least).unwrap_or(best)
 }
 
-/// Widths of least cost: the best of `tried` on all joints, then a common width near it, then one for each joint.
+/// Widths of friction regularisation of least cost: the best of `tried` on all joints, then a common width near it, then one for each joint; none if
+/// no cost is finite.
 fn least_widths<const N: usize>(
     cost: impl Fn([f64; N]) -> f64,
     tried: impl IntoIterator<Item = f64>,
@@ -71,19 +76,20 @@ fn least_widths<const N: usize>(
     Some(best)
 }
 
-/// Widths of least cost near the widths `from`, joint by joint; a joint of exact friction, whose width is zero, keeps it.
+/// Widths of friction regularisation of least cost near the widths `from`, joint by joint; a joint of exact friction, whose width is zero, keeps it.
 fn refined_widths<const N: usize>(cost: impl Fn([f64; N]) -> f64, from: [f64; N]) -> Widths<N> {
     (0..N)
         .filter(|j| from[*j] > 0.0)
         .fold((from, cost(from)), |best, joint| nearby(&cost, best, joint..joint + 1, REFINED))
 }
 
-/// Widths, none less than the joint's `narrowest` but the zero widths of exact friction.
+/// Widths of friction regularisation, each raised to the joint's `narrowest` if it is smaller, rad/s or m/s; the zero widths of exact friction
+/// remain.
 fn no_narrower<const N: usize>(widths: [f64; N], narrowest: [f64; N]) -> [f64; N] {
     std::array::from_fn(|j| if widths[j] > 0.0 { widths[j].max(narrowest[j]) } else { 0.0 })
 }
 
-/// Widths in increasing order of which at most one is no wider than every joint's `narrowest`, and would stand for the narrower ones.
+/// The tried widths in increasing order, each raised to the smallest of the joints' `narrowest` widths if it is smaller, and equal ones listed once.
 fn distinct<const N: usize>(tried: [f64; WIDTHS.len()], narrowest: [f64; N]) -> Vec<f64> {
     let least = narrowest.into_iter().fold(f64::INFINITY, f64::min);
     let mut distinct: Vec<f64> = tried.into_iter().map(|width| width.max(least)).collect();
@@ -91,7 +97,8 @@ fn distinct<const N: usize>(tried: [f64; WIDTHS.len()], narrowest: [f64; N]) -> 
     distinct
 }
 
-/// Narrowest widths of friction regularisation by joint, rad/s or m/s, with which the steps of predictions are stable at the start of every window.
+/// Narrowest widths of friction regularisation by joint, rad/s or m/s, with which the integration steps of predictions are stable at the beginning of
+/// every window.
 fn narrowest_widths<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     problem: &FitProblem<A, N, P>,
     model: &Hypothesis<P>,
@@ -107,8 +114,8 @@ fn narrowest_widths<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     Some(narrowest)
 }
 
-/// The model with the widths of friction regularisation that `search` finds, given their cost and the narrowest ones; none where its own widths cost no
-/// more. Costs are those after the values are estimated again to first order, from the model's `jacobian`.
+/// The model with the widths of friction regularisation that `search` finds, given the cost of widths and the narrowest ones; none where the cost is
+/// no lower than with the model's own widths. Costs are those after the model's values are estimated again to first order, from its `jacobian`.
 fn with_widths<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     problem: &FitProblem<A, N, P>,
     model: &Hypothesis<P>,
@@ -123,8 +130,8 @@ fn with_widths<A: Arm<f64, N, P>, const N: usize, const P: usize>(
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// The model with the widths of friction regularisation that suit the training windows best, its values estimated again to first order from its
-    /// `jacobian`; none where no width does better than the model's own.
+    /// The model with the widths of friction regularisation of lowest cost on the training windows, where the cost is that after the model's values
+    /// are estimated again to first order from its `jacobian`; none where no width does better than the model's own.
     pub(crate) fn with_best_widths(
         &self,
         problem: &FitProblem<A, N, P>,
@@ -137,8 +144,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         with_widths(problem, model, jacobian, search)
     }
 
-    /// Alternatives to a model: with the widths of friction regularisation that suit it best, and with dry friction if the model's friction is
-    /// regularised now.
+    /// Alternatives to a model: one with the widths of friction regularisation of lowest cost, and one with exact dry friction if the model's
+    /// friction is regularised.
     pub fn regularisation_guesses(
         &self,
         model: &Hypothesis<P>,
@@ -150,8 +157,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         regularised.into_iter().chain(exact).collect()
     }
 
-    /// The best fit of a model to the training windows, with its own widths of friction regularisation or with those that suit it best: what a model
-    /// with a further cause is compared with.
+    /// The better fit of a model to the training windows: with its own widths of friction regularisation or with those of lowest cost. A model with a
+    /// further cause is compared with this fit.
     pub(crate) fn fit_with_any_rounding(&self, model: &Hypothesis<P>, weights: &SplitWeighting<N>) -> Fit<P> {
         let problem = self.problem(&weights.training);
         let fit = problem.solve(model, Effort::FULL);
@@ -177,7 +184,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         is_regularisation(node, &best).then_some(best.fit)
     }
 
-    /// A model with its widths of friction regularisation and its parameters refined in turn, as long as the cost falls.
+    /// A candidate with its widths of friction regularisation and its parameters refined in turn, as long as the cost falls.
     pub(crate) fn with_widths_refined(
         &self,
         node: &SearchNode<N, P>,

@@ -5,10 +5,10 @@
 //! * `belief`: selection probability of a cause.
 //! * `crosswise`: interleaved cross-validation, logs cut into stretches of which every other one is fitted to and the rest judged on.
 //! * `evidence`: evidence for each cause in the final model, and the cause's probability.
-//! * `friction_regularisation`: width over which the sign of friction is regularised, a nuisance.
-//! * `model_search`: stepwise selection, one cause after another, and causes that become idle.
-//! * `reconsider`: a rival in the place of its cause, once the other causes are known.
-//! * `rivals`: close rivals compared in pairs, look-alikes, a table as the rival of a named cause.
+//! * `friction_regularisation`: width over which the sign of friction is regularised, fitted as a nuisance.
+//! * `model_search`: stepwise selection: one cause is added after another, and causes that become idle are dropped.
+//! * `reconsider`: replacement of a cause by a rival candidate that explains the windows better once the other causes are known.
+//! * `rivals`: close candidates compared in pairs, equivalent effects, and a table over one variable of the motion as the rival of a named cause.
 //! * `together`: two causes of which neither is accepted alone.
 
 pub mod acceptance;

@@ -24,28 +24,28 @@ pub struct Attribution<const N: usize, const P: usize> {
     pub on_holdout: Fit<P>,
     /// Accepted causes, strongest first.
     pub causes: Vec<Cause>,
-    /// Every search node in order; at the last one nothing was accepted.
+    /// All search nodes in order, one per step of the search; at the last one nothing was accepted.
     pub nodes: Vec<SearchNode<N, P>>,
 }
 
 impl<const N: usize, const P: usize> Attribution<N, P> {
-    /// The effect that was added after search node `node`; none if none was.
+    /// The effect that the search added to the model of the search node with index `node`; none if it added none.
     pub fn added(&self, node: usize) -> Option<&EffectInstance> {
         added(&self.nodes.iter().collect::<Vec<_>>(), node)
     }
 
-    /// RMS error of the final model on the holdout relative to the motion within the windows.
+    /// RMS prediction error of the final model on the holdout relative to the RMS motion within the windows.
     pub fn error(&self) -> f64 {
         self.nodes.last().map_or(f64::INFINITY, SearchNode::relative_error)
     }
 
-    /// Whether the final model leaves a gap of consequence that is more than noise.
+    /// Whether the final model leaves a gap of consequence whose cost exceeds the noise floor by more than the factor `UNEXPLAINED`.
     pub fn is_unexplained(&self) -> bool {
         self.nodes.last().is_some_and(SearchNode::is_unexplained)
     }
 }
 
-/// The effect that was added after the search node of index `node`; none if none was.
+/// The effect that the search added to the model of the search node with index `node`; none if it added none.
 pub(crate) fn added<'a, const N: usize, const P: usize>(
     nodes: &[&'a SearchNode<N, P>],
     node: usize,
@@ -57,16 +57,19 @@ pub(crate) fn added<'a, const N: usize, const P: usize>(
 
 /// State of a model search: accepted causes, current and previous search nodes.
 pub(crate) struct ModelSearch<const N: usize, const P: usize> {
+    /// Causes accepted so far.
     pub causes: Vec<Cause>,
-    /// Search nodes before the current one.
+    /// Search nodes before the current one, in order.
     pub nodes: Vec<SearchNode<N, P>>,
+    /// Current search node.
     pub node: SearchNode<N, P>,
+    /// Whether friction is regularised in the current model.
     pub regularised: bool,
-    /// Whether the friction regularisation has been fitted.
+    /// Whether the widths of friction regularisation have been fitted where no candidate was accepted, which is done once.
     pub regularisation_fitted: bool,
-    /// Smallest improvement that counts, RMS on the holdout relative to the motion within the windows.
+    /// Smallest RMS improvement of the predictions on the holdout for a candidate to be accepted, relative to the motion within the windows.
     pub threshold: f64,
-    /// Whether a cause has been swapped for a rival before.
+    /// Whether the search has already replaced a cause by a rival candidate, which is done once at most.
     pub turned: bool,
 }
 
@@ -118,11 +121,11 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         Attribution { refit, model, on_holdout, causes, nodes }
     }
 
-    /// The node around the arm with its parameters re-estimated, with or without encoder zeros that differ between recordings.
+    /// The first search node, around the arm with its parameters re-estimated, with or without encoder zeros that differ between recordings.
     ///
-    /// Encoder zeros that differ between recordings also take up the mean error that a large missing effect makes in a recording; other effects would
-    /// then be fitted to the rest. So the first cause is sought with such zeros only where they explain more than the cause would, or where no cause
-    /// is found without them; later nodes always have them.
+    /// Encoder zeros that differ between recordings also take up the mean error that a large unmodelled effect makes in a recording; other effects
+    /// would then be fitted to the rest. So the first cause is sought with such zeros only where the zeros explain more than the cause would, or
+    /// where no cause is found without such zeros; later nodes always have them.
     fn first_node(
         &self,
         nominal: &Hypothesis<P>,
@@ -156,7 +159,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         seed: u64,
     ) {
         loop {
-            // A cause that stands in for its rival leaves a gap that others would be taken up for.
+            // A cause accepted in place of a better rival leaves a gap to which further effects would be fitted.
             if let Some(other) = self.reconsidered(search, false, min_relevance, max_causes, seed) {
                 *search = other;
                 return;
@@ -196,7 +199,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         }
     }
 
-    /// Drops the causes that stood in for regularised friction, once friction is regularised in the model, and goes on to the node without them.
+    /// Drops the causes that only imitated regularised friction, once friction is regularised in the model, and moves the search on to the node
+    /// without them.
     fn drop_idle(&self, search: &mut ModelSearch<N, P>, min_relevance: f64) {
         let (mut model, known) = (search.node.settled.clone(), search.causes.len());
         self.prune(&mut model, &mut search.causes, &search.node);
@@ -205,8 +209,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         }
     }
 
-    /// Restarts a search that has ended with a gap, from its first node with another pair of causes, as the first cause may have stood in for both.
-    /// Only a pair that explains nearly all of the gap counts.
+    /// Restarts a search that has ended with a gap, from its first node with a pair of causes, as the first cause may have been accepted in place of
+    /// the two. The search is returned unchanged if no pair explains nearly all of the gap.
     fn restarted(
         &self,
         mut search: ModelSearch<N, P>,
@@ -235,8 +239,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         search.threshold = self.look_closer(&mut search.node, settled, min_relevance, UNEXPLAINED);
     }
 
-    /// Searches for causes of a gap that is too small to matter by itself and yet exceeds the noise floor by the factor `clear`; returns the smallest
-    /// improvement that counts, relative to the motion. `settled` is the fit that `node` was made around.
+    /// Repeats a node with the threshold `FAINTEST` where its gap is too small to matter by itself and yet exceeds the noise floor by the factor
+    /// `clear`; returns the smallest RMS improvement that counts, relative to the motion. `settled` is the fit that `node` was made around.
     fn look_closer(
         &self,
         node: &mut SearchNode<N, P>,
@@ -273,6 +277,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         }
     }
 
+    /// A fit as a candidate with the costs of all windows under the weights of `node`, for comparison with other fits.
     fn judged(&self, node: &SearchNode<N, P>, fit: Fit<P>, effect: Option<EffectInstance>) -> Candidate<P> {
         let training = self.problem(&node.weights.training).window_costs(&fit.hypothesis);
         let (holdout, error) = self.judged_on_holdout(&node.weights, &fit);
@@ -287,7 +292,7 @@ pub(crate) fn refresh<const P: usize>(model: &Fit<P>, causes: &mut [Cause]) {
         for effect in &model.hypothesis.effects {
             if effect.same_place(&cause.effect) {
                 cause.effect = *effect;
-                // A value that the training windows do not show may be known from those of the holdout.
+                // A value that the training windows do not show may be known from the holdout: the smaller standard deviation is kept.
                 let known = cause.sigma.iter().copied().chain(std::iter::repeat(f64::INFINITY));
                 let fitted = (first..first + effect.len()).map(|i| model.sigma(i));
                 cause.sigma = fitted.zip(known).map(|(fitted, known)| fitted.min(known)).collect();

@@ -1,10 +1,10 @@
 //! Correction of a choice between rivals that was made too early in a model search.
 //!
-//! Of two effects that look alike, such as a lag and a delay, the better one may show only once the other causes are known: in a gap ten times as
-//! large, the difference between them is noise. And what a law with more values explained beyond a law with fewer may have been the effect of a cause
-//! that was found later. So before a further cause is looked for, each rival takes the place of its cause beside all other causes; if the rival does
-//! better, or as well with fewer values, the search goes on from there again. The search that ends with the smaller error counts, if it has no more
-//! causes: while a gap remains, further causes may be added that only imitate it.
+//! Of two effects that look alike, such as a lag and a delay, the right one may explain the windows better only once the other causes are known: in a
+//! gap ten times as large, the difference between the two is noise. And what an effect with more free values explained beyond one with fewer may have
+//! been due to a cause that was found later. So before a further cause is looked for, each rival replaces its cause in the model with all other
+//! causes; if the rival does better, or as well with fewer values, the search is continued with it. The search that ends with the smaller prediction
+//! error counts, if it has no more causes: while a gap remains, further causes may be added that only imitate it.
 
 use crate::likelihood::context::DiagnosisContext;
 use crate::likelihood::solve::Effort;
@@ -17,40 +17,42 @@ use crate::search::model_search::{ModelSearch, added};
 use crate::search::rivals::equivalent;
 use armgap_core::arm::Arm;
 
-/// Share of the gain of a cause that a rival has to explain at the node where the cause was added.
+/// Least share of the gap that a rival must remove at the search node where a cause was added, relative to the share that the cause removes.
 const RIVALS: f64 = 0.5;
 
-/// Rivals that are tried for each cause at most.
+/// Largest number of rivals that are tried in the place of each cause.
 const TRIED: usize = 3;
 
-/// Mean advantage per window, in standard errors, above which a rival is better beside the other causes.
+/// Mean decrease of the windows' cost, in standard errors of this mean, when a rival replaces a cause in the model with all other causes, above which
+/// the rival is better.
 const BETTER: f64 = 2.0;
 
-/// Factor by which the prediction error may be larger at the end of a search from a rival with fewer values.
+/// Factor by which the RMS prediction error may be larger with a rival that has fewer free values than the cause it replaces.
 const AS_WELL: f64 = 1.05;
 
-/// Factor by which the prediction error has to be smaller at the end of a search from a rival with more values: a law that holds the other within it
-/// always fits a little better.
+/// Ratio of the final RMS prediction error of a search with a rival of more free values to that with the cause, below which the rival is accepted: an
+/// effect that contains another one as a special case always fits a little better.
 const RICHER: f64 = 0.9;
 
-/// A candidate that, beside the other causes, does better than the cause that was added in its place.
+/// A candidate that, together with all other causes, explains the windows better than the cause that was added in its place.
 struct Rival<const P: usize> {
     /// Index of the search node at which the rival was not chosen.
     node: usize,
-    /// The rival as fitted at the node where it was not chosen.
+    /// The rival as fitted at the search node where it was not chosen.
     fitted: Candidate<P>,
     /// The effect that was added in place of the rival.
     instead_of: EffectInstance,
-    /// Probability that the rival is better than its cause; none where it has fewer values and does as well.
+    /// Probability that the rival explains the windows better than its cause; none where the rival has fewer free values and explains them as well.
     better: Option<f64>,
-    /// Factor on the prediction error of the current search below which the error of a search from the rival has to be.
+    /// Ratio below which the final RMS prediction error of a search with the rival, over that of the current search, has to be for the rival to be
+    /// accepted.
     allowed: f64,
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// The search that adds a better rival in the place of its cause, if that search ends with a smaller error. Rivals with more values than their
-    /// cause are tried only once a search has `ended`, and those with fewer or as many before: what more values explain may still be due to another
-    /// cause.
+    /// The search in which a better rival takes the place of its cause, if that search ends with a smaller prediction error; none otherwise. Rivals
+    /// with more free values than their cause are tried only once a search has `ended`, and those with fewer or as many before: what more values
+    /// explain may still be due to another cause.
     pub(crate) fn reconsidered(
         &self,
         search: &ModelSearch<N, P>,
@@ -69,13 +71,14 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         (as_good && self.needed(&other) <= self.needed(search)).then_some(other)
     }
 
-    /// The first rival that does better than its cause beside the other causes.
+    /// The rival, of the earliest search node that has one, that explains the windows better than its cause, together with all other causes.
     fn better_rival(&self, search: &ModelSearch<N, P>, ended: bool, seed: u64) -> Option<Rival<P>> {
         let all: Vec<&SearchNode<N, P>> = search.nodes.iter().chain([&search.node]).collect();
         (0..search.nodes.len()).find_map(|index| self.better_in(&all, index, ended, seed))
     }
 
-    /// The best rival that does better than its cause beside the other causes, among the candidates not chosen at node `index`.
+    /// The best rival that explains the windows better than its cause, together with all other causes, among the candidates not chosen at the search
+    /// node with index `index` of `all`.
     fn better_in(&self, all: &[&SearchNode<N, P>], index: usize, ended: bool, seed: u64) -> Option<Rival<P>> {
         let (node, last, adopted) = (all[index], *all.last()?, added(all, index)?);
         let model = &last.settled.hypothesis;
@@ -94,7 +97,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         };
         let finalists =
             node.candidates.iter().filter(|c| is_rival(c, node.share(c), node.share(cause))).take(TRIED);
-        // One with fewer values may have fallen behind just for what they are not about.
+        // A candidate with fewer free values may have been dropped early for errors that are due to other causes.
         let of_cause = node.field.iter().find(|(c, _)| c.effect.is_some_and(|e| e.same_place(adopted)));
         let is_final = |c: &Candidate<P>| node.candidates.iter().any(|f| f.is_same(c));
         let passed_over = node.field.iter().filter(|(c, share)| {
@@ -126,7 +129,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         as_good.min_by_key(|(swapped, _)| size(swapped)).map(|(_, rival)| rival)
     }
 
-    /// Takes the search back to the node at which `rival` was not chosen, and continues with the rival in place of its cause.
+    /// The search taken back to the node at which `rival` was not chosen, with the rival added in place of its cause.
     fn back_to(
         &self,
         search: &ModelSearch<N, P>,

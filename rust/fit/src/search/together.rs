@@ -1,8 +1,8 @@
 //! Two causes at once: either leaves so much of the gap to the other that neither is accepted alone.
 //!
-//! A cause is judged by the part of the gap it removes. Of two causes of the same size each removes a half of the gap at most, and if the windows
-//! weigh by the worse of the two, much less. So before a search ends with an open gap, each of the best candidates is accepted on trial: if another
-//! then closes nearly all of the gap, and neither can be spared, both are causes.
+//! A cause is judged by the share of the gap that it removes. Of two causes of the same size each removes a half of the gap at most, and much less if
+//! the other one dominates the windows' costs. So before a search ends with an open gap, each of the best candidates is accepted on trial: if a
+//! second effect then closes nearly all of the gap, and neither of the two can be spared, both are causes.
 
 use crate::likelihood::context::DiagnosisContext;
 use crate::likelihood::solve::Effort;
@@ -15,17 +15,18 @@ use armgap_core::arm::Arm;
 /// Share of the gap above the noise floor that two effects must explain to be accepted together.
 const NEARLY_ALL: f64 = 0.85;
 
-/// Part of the gain needed from a second effect that a candidate must bring to first order for the second effect to be looked for.
+/// Decrease of the cost that a score test (first order) must promise for some second effect, relative to the decrease needed from it, for a second
+/// effect to be fitted together with a first one that is accepted on trial.
 const FORESEEN: f64 = 0.3;
 
-/// Candidates that are accepted on trial, as the first of two causes.
+/// Number of candidates that are accepted on trial, one after another, as the first of two causes.
 const TRIED: usize = 3;
 
-/// Mean advantage per window, in standard errors, below which a candidate is not tried as one of two causes, unless it brings implausible parameters
-/// back to their prior values.
+/// Least mean decrease of the windows' cost by a candidate, in standard errors of this mean, for the candidate to be tried as one of two causes,
+/// unless it brings implausible parameters back to their prior values.
 const HOPEFUL: f64 = 1.5;
 
-/// Two causes, and the search node at which the second was found.
+/// Two causes that are accepted together, and the search node at which the second was found.
 pub struct Both<const N: usize, const P: usize> {
     /// The two causes, in the order in which they were found.
     pub causes: [Cause; 2],
@@ -36,7 +37,8 @@ pub struct Both<const N: usize, const P: usize> {
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// The two effects that together explain the gap of node `alone` where none explains it alone; the first of the two is not `but`.
+    /// Two effects that together explain the gap of search node `alone`, where none explains it alone, the first of them not being the effect `but`;
+    /// none if there is no such pair.
     pub fn together(
         &self,
         alone: &SearchNode<N, P>,
@@ -62,7 +64,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             .find_map(|first| self.beside(alone, first, min_relevance, seed))
     }
 
-    /// The pair of effect `first` and the effect that explains the rest of the gap of node `alone`; none if one of the two can be spared.
+    /// Effect `first` and the effect that explains the rest of the gap of search node `alone`, as two causes; none if there is no such effect or if
+    /// one of the two can be spared.
     fn beside(
         &self,
         alone: &SearchNode<N, P>,
@@ -71,7 +74,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         seed: u64,
     ) -> Option<Both<N, P>> {
         let (fit, weights) = self.settle(&first.fit.hypothesis, alone.weights.training.scale);
-        // The part of what `first` leaves that a second has to take off it.
+        // Share of the gap left by `first` that a second effect must remove for the two to remove `NEARLY_ALL` of the whole gap.
         let needed = 1.0 - (1.0 - NEARLY_ALL) / (1.0 - alone.share(first)).max(1e-9);
         if self.largest_gain(&fit, &weights) < FORESEEN * needed {
             return None;

@@ -1,8 +1,9 @@
-//! Comparison of two effects that explain about the same, each under window weights made around it.
+//! Comparison of two candidate effects that lower the cost about equally, each under window weights made around it.
 //!
-//! Windows are weighed, and their initial states fitted, around the best candidate. This favours the best candidate: an initial state that had to be
-//! moved far for it is known less well from then on, and can take up the error that the rival would explain in that window. Of two candidates that
-//! are close, each is therefore judged under weights made around either, and the weights under which the winner leads more clearly decide.
+//! The robust weights of windows and their fitted initial states follow from the predictions of the best candidate. This favours the best candidate:
+//! an initial state that had to be moved far for it gets a larger standard deviation, and can then take up the error that the rival would explain in
+//! that window. Two close candidates are therefore compared under weights made around either, and the weights under which the winner leads by more
+//! standard errors decide.
 
 use crate::likelihood::context::DiagnosisContext;
 use crate::likelihood::solve::Effort;
@@ -12,11 +13,13 @@ use crate::search::attribute::{Candidate, SearchNode};
 use crate::search::rivals::equivalent;
 use armgap_core::arm::Arm;
 
-/// Standard errors of the mean advantage per window within which the best candidate leads a close rival.
+/// Mean difference of the windows' costs between the best candidate and another one, in standard errors of this mean, below which the other one is a
+/// close rival.
 const CLOSE: f64 = 3.0;
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// The node under window weights made around its best candidate or around the closest rival, whichever make the winner lead more clearly.
+    /// The node with its candidates fitted again under window weights made around its best candidate or around the closest rival, whichever make the
+    /// winner lead by more standard errors; the node itself if no rival is close.
     pub(crate) fn duel(&self, node: SearchNode<N, P>) -> SearchNode<N, P> {
         let Some((best, rival)) = close_pair(&node) else { return node };
         let current = node.settled.hypothesis.clone();
@@ -25,7 +28,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         if lead(&other) > lead(&own) { other } else { own }
     }
 
-    /// The node with its finalists fitted under window weights made around candidate `one`.
+    /// The node with its candidates fitted again under window weights made around the candidate of index `one`.
     fn around(&self, current: &Hypothesis<P>, node: &SearchNode<N, P>, one: usize) -> SearchNode<N, P> {
         let chosen = &node.candidates[one].fit.hypothesis;
         let (_, weights) = self.settle(chosen, node.weights.training.scale);
@@ -38,7 +41,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     }
 }
 
-/// Indices of the best candidate and of the first one close to it, if motion can tell their effects apart.
+/// Indices of a node's best candidate and of the first other one with nearly the same cost whose effect logs of motion can distinguish; none if there
+/// is none, or if the best removes too little of the gap to count.
 fn close_pair<const N: usize, const P: usize>(node: &SearchNode<N, P>) -> Option<(usize, usize)> {
     let (best, others) = node.candidates.split_first()?;
     if node.share(best) < MATTERS {
@@ -58,7 +62,7 @@ fn is_close<const N: usize, const P: usize>(
     alike && other.z_over(&node.base) > CLOSE && !equivalent::are(&a, &b, N)
 }
 
-/// Lead of a node's best candidate over the second, in standard errors of the mean advantage per window.
+/// Mean difference of the windows' costs between a node's second and best candidates, in standard errors of this mean.
 fn lead<const N: usize, const P: usize>(node: &SearchNode<N, P>) -> f64 {
     match &node.candidates[..] {
         [best, second, ..] => best.z_over(second),

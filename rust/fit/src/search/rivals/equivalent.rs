@@ -1,15 +1,15 @@
-//! Pairs of effects that no log of motion alone tells apart.
+//! Pairs of effects that no log of motion alone distinguishes.
 
 use crate::model::hypothesis::EffectInstance;
 
-/// An effect that could stand in for a given effect, with the reason.
+/// An effect that cannot be distinguished from a given effect, with the reason.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Equivalent {
     /// Name of the effect in the library.
     pub effect: &'static str,
     /// 1-based joint of the effect; none for effects of the whole arm.
     pub joint: Option<usize>,
-    /// Reason why the two effects cannot be told apart.
+    /// Reason why the effect and the given effect cannot be distinguished.
     pub why: String,
 }
 
@@ -68,7 +68,7 @@ fn contains(whole: &str, part: &str) -> bool {
     (whole, part) == ("hardening_spring", "joint_spring")
 }
 
-/// Known equivalents of an effect and the look-alikes found in the data, none twice.
+/// Effects that cannot be distinguished from `effect`: those known to give the same motion, then the look-alikes found in the logs, none twice.
 pub fn all(effect: &EffectInstance, look_alikes: &[EffectInstance], joints: usize) -> Vec<Equivalent> {
     let mut list = known(effect, joints);
     for other in look_alikes {

@@ -1,8 +1,8 @@
 //! Rivals of a cause.
 //!
-//! * `duel`: pairwise comparison of close rivals, re-weighted.
-//! * `equivalent`: pairs of effects that no log of motion alone tells apart.
-//! * `rival_law`: a table over a variable of the motion as the rival of a named cause.
+//! * `duel`: pairwise comparison of close candidates, under window weights made from either.
+//! * `equivalent`: pairs of effects that no log of motion alone distinguishes.
+//! * `rival_law`: a table of torque over one variable of the motion as the rival of a named cause.
 
 pub(crate) mod duel;
 pub mod equivalent;

@@ -1,7 +1,8 @@
-//! The rival of every named cause: an unnamed torque, as a table over the variable that predicts best what the arm lacks without the cause.
+//! The rival of every named cause: an unnamed torque, as a table over the variable of the motion that best predicts the residual torque without the
+//! cause.
 //!
-//! An effect that is not in the arm is named where it imitates the missing torque better than the other effects do. A table has no form of its own to
-//! imitate with: where it explains much more of the holdout than the named effect, the form of the named effect is wrong.
+//! An effect that is not in the arm is named where it imitates the unmodelled torque better than the other effects do. A table can take any form over
+//! its variable: where it explains much more of the holdout than the named effect, the form of the named effect is wrong.
 
 use crate::likelihood::context::{DiagnosisContext, SplitWeighting, WindowSet};
 use crate::likelihood::solve::{Effort, Fit};
@@ -16,8 +17,8 @@ use armgap_core::arm::Arm;
 use nalgebra::SVector;
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// Variables that the torques missing in a model depend on, strongest first: tables fitted to the training logs that predict the holdout, each
-    /// beside the model with everything fitted again.
+    /// Tables of a model's residual torque over one variable of the motion each, strongest first, fitted to the training logs: those that remove a
+    /// considerable share of the holdout's gap, each added to the model with everything fitted again.
     pub(crate) fn laws_beside(
         &self,
         model: &Fit<P>,
@@ -33,7 +34,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         laws
     }
 
-    /// Variables that the torques missing in a model depend on by inverse dynamics, strongest first; tables are taken from the training logs.
+    /// Tables of a model's residual torque by inverse dynamics over one variable of the motion each, strongest first, fitted to the training logs.
     fn dependences(&self, model: &Hypothesis<P>, wanted: Wanted) -> Vec<Dependence> {
         let of = |set: &WindowSet<N>, teaches| -> Vec<LogResidual<N>> {
             let tracks = &set.data.tracks;
@@ -44,13 +45,14 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         dependences(&self.arm, &model.theta, &self.prior.sigma, &logs, wanted)
     }
 
-    /// Holdout cost of a model with the best table of an unnamed torque added; none where no table predicts what the model lacks.
+    /// Cost on the holdout of a model with the table of torque added that best predicts the model's residual torque from one variable of the motion;
+    /// none where no table predicts it.
     pub(crate) fn rival_cost(&self, model: &Hypothesis<P>, weights: &SplitWeighting<N>) -> Option<f64> {
         let rival = self.dependences(model, Wanted { most: 1, rotary: true }).into_iter().next()?;
         Some(self.cost_beside(model, &rival, weights))
     }
 
-    /// Holdout cost of a model with the torques of a law added, everything fitted again to the training logs.
+    /// Cost on the holdout of a model with the torques of the table `law` added, everything fitted again to the training logs.
     fn cost_beside(&self, model: &Hypothesis<P>, law: &Dependence, weights: &SplitWeighting<N>) -> f64 {
         let beside = Self {
             training: WindowSet::new(with_torques(&self.training.data, law)),
