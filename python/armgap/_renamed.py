@@ -1,4 +1,4 @@
-"""Names that changed in 0.2.0, and modules that moved: old names work with a warning until 0.3.0."""
+"""Public names and modules that were renamed in armgap 0.2.0: the old names work with a `DeprecationWarning` until 0.3.0."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import Any
 
 __all__ = ["MOVED", "RENAMED", "find_moved_modules", "old_names"]
 
-#: Old public name to new public name, each with its module.
+#: New name of each renamed public object, by its old name; both names include the module.
 RENAMED = {
     "armgap.OwnEffect": "armgap.CustomEffect",
     "armgap.diagnosis.AtHorizon": "armgap.diagnosis.GapAtHorizon",
@@ -36,7 +36,7 @@ RENAMED = {
 }
 
 
-#: Old module to new module; submodules of a moved package have moved too.
+#: New name of each module or package that moved, by its old name; submodules of a moved package have moved with it.
 MOVED = {
     "armgap.arm.serial_arm_file": "armgap.arm.serial.arm_file",
     "armgap.arm.serial_chain": "armgap.arm.serial.chain",
@@ -183,14 +183,14 @@ def find_moved_modules() -> None:
 
 
 def old_names(module: str, *, stacklevel: int = 2) -> Callable[[str], Any]:
-    """Return the ``__getattr__`` of a module some of whose names have changed.
+    """Return a ``__getattr__`` for a module, which finds objects of the module by their old names and warns.
 
     Parameters
     ----------
     module : str
         Name of the module.
     stacklevel : int, default 2
-        Frame that the warning names: 2 is the caller of ``__getattr__`` where this is the returned function itself.
+        Stack frame that the warning names: 2 is the caller of ``__getattr__`` where the returned function itself is the ``__getattr__``.
 
     Examples
     --------

@@ -42,7 +42,7 @@ class ArmgapError(Exception):
     """
 
     part = "column"
-    """Word for `column` in the message of the error."""
+    """Word before the name `column` in the message of the error: ``"column"``, ``"key"`` or ``"element"``."""
 
     def __init__(
         self,
@@ -64,12 +64,12 @@ class ArmgapError(Exception):
         text = f"{', '.join(place)}: {problem}" if place else problem
         text = text.encode("utf-8", "surrogateescape").decode(
             "utf-8", "backslashreplace"
-        )  # names of files may be any bytes
+        )  # a file's name may contain bytes that are no valid text
         super().__init__(" ".join((f"{text}; {remedy}" if remedy else text).split()))
 
 
 class LogReadError(ArmgapError, OSError):
-    """A log cannot be read at all: missing, a folder, or not the format its name promises."""
+    """A log cannot be read at all: the file is missing, a folder, or not in the format that its name states."""
 
     def __str__(self) -> str:
         """Return the error as one line of text."""
@@ -132,4 +132,4 @@ CATALOGUE: tuple[type[ArmgapError], ...] = (
     OptionError,
     ResultError,
 )
-"""All concrete error classes; each has a case in the table of bad inputs."""
+"""All concrete error classes; the tests hold a bad input for each."""

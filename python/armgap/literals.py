@@ -1,4 +1,4 @@
-"""Words of results and options as `Literal` types, so that a type checker accepts exactly the known ones."""
+"""Words of results and options as `Literal` types, so that a type checker accepts exactly the known words."""
 
 from __future__ import annotations
 
@@ -39,13 +39,13 @@ GapOutcome = Literal["smaller", "larger", "unchanged", "none"]
 ChainStage = Literal["drive", "transmission", "mechanics", "sensor"]
 
 SERIAL = "serial"
-"""Kind of arm that has a chain of joints."""
+"""Kind of a serial arm: joints one after another from the base, given by a chain."""
 SCHEMES: tuple[Scheme, ...] = get_args(Scheme)
 """Names of the regression models, in the order of Reyes and Kelly (1997)."""
 FILTERS: tuple[Filters, ...] = get_args(Filters)
-"""Sets of filters for identification: consistent ones, and those of Reyes and Kelly (1997) as printed."""
+"""Sets of filters for identification: consistent filters, and those of Reyes and Kelly (1997) as printed."""
 VELOCITIES: tuple[VelocityMethod, ...] = get_args(VelocityMethod)
-"""Methods to compute velocities from positions."""
+"""Sources of velocities for identification: methods to compute velocities from positions, or a sensor."""
 VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
 """Verdicts of a diagnosis."""
 STATUSES: tuple[Status, ...] = get_args(Status)
@@ -53,9 +53,9 @@ STATUSES: tuple[Status, ...] = get_args(Status)
 CAUSE_STATUSES: tuple[CauseStatus, ...] = get_args(CauseStatus)
 """Statuses of a cause in a comparison of two diagnoses."""
 GAP_OUTCOMES: tuple[GapOutcome, ...] = get_args(GapOutcome)
-"""Changes of the gap between two diagnoses."""
+"""Words for the change of the gap between two diagnoses; ``"none"`` if neither diagnosis has a gap."""
 CHAIN_STAGES: tuple[ChainStage, ...] = get_args(ChainStage)
-"""Stages of the chain from command to measured position."""
+"""Stages of the drive chain from commanded torque to measured position."""
 
 
 def joint_units(data: dict[str, Any]) -> list[str]:

@@ -1,7 +1,7 @@
 """Progress of long work, reported to a callback.
 
 Long computations call `report_progress`; `use_callback` sets the function that receives the reports inside a block. The callback is
-kept in a context variable, so that a reader of files deep inside a diagnosis reports without a parameter for it in every function above.
+kept in a context variable, so that a reader of files deep inside a diagnosis reports without a callback parameter in every calling function.
 """
 
 from __future__ import annotations

@@ -33,7 +33,7 @@ def place_text(entry: Mapping[str, Any]) -> str:
 
 
 def by_joint(causes: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Return causes with one entry per joint in place of a cause with a common law on several joints.
+    """Return causes of a diagnosis with one cause per joint in place of a cause with a common law on several joints.
 
     Examples
     --------

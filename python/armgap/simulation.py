@@ -30,7 +30,7 @@ class Effect:
     joint : int or None
         1-based joint; None for an effect of the whole arm.
     parameters : mapping of str to float
-        Values [SI].
+        Values of the effect's parameters [SI], by name.
     """
 
     name: str
@@ -69,7 +69,7 @@ def effects() -> list[dict[str, Any]]:
 
 
 def seed_torque(t: ArrayLike) -> NDArray[np.float64]:
-    """Return the torques (31) and (32) of Reyes and Kelly (1997).
+    """Return the excitation torques of a two-link arm in equations (31) and (32) of Reyes and Kelly (1997).
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ def simulate(
     tolerance : float, default 1e-9
         Largest admissible change of a position when steps are halved [rad or m].
     smoothing : float or array_like, shape (n_joints,), default 0
-        Width of a smoothed sign of friction [rad/s], of all joints or joint by joint; 0 is dry friction.
+        Width of the friction regularisation [rad/s], of all joints or joint by joint; 0 is dry friction.
     sensor : bool, default False
         Keep the simulated velocities as the log's `dq`.
     name : str

@@ -5,17 +5,17 @@ file               what
 =================  ================================================================================
 `rigid_body`       the ten inertial parameters of a link
 `controller`       the position controller of a serial arm
-`serial_chain`     the chain of a serial arm
+`serial.chain`     the chain of a serial arm
 `free_space`       links as capsules, obstacles as boxes
-`serial_toml`      a serial arm as text
+`serial.toml`      the arm file of a serial arm as text
 `arm`              `Arm`, `MotionLimits`
 `corrections`      corrections of a log's columns: signs, zeros, units, order
 `description`      URDF and MJCF as a tree, resolved to a chain; edits of URDF and MJCF text
-`serial_links`     links of a serial arm in an arm file
-`serial_trust`     default standard deviations of a serial arm's parameters
-`serial_arm_file`  arm files of serial arms
-`arm_file`         arm files
-`model`            `read_model`: a description as an arm
+`serial.links`     links of a serial arm in an arm file
+`serial.trust`     default standard deviations of a serial arm's parameters
+`serial.arm_file`  reading and checking of arm files of serial arms
+`arm_file`         reading and checking of arm files
+`model`            `read_model`: a robot's description read as an arm
 =================  ================================================================================
 """
 

@@ -35,7 +35,7 @@ class MotionLimits:
     speed, acceleration : ndarray, shape (n_joints,)
         Largest speed [rad/s or m/s] and acceleration [rad/s^2 or m/s^2].
     space : FreeSpace, optional
-        Obstacles that the links must not touch.
+        Shapes of the links, and obstacles that the links must not touch.
     """
 
     position_min: NDArray[np.float64]
@@ -87,7 +87,7 @@ class Arm:
     columns : dict of str to str
         Names that the arm's logs use for ``t``, ``q1``, ``tau1`` and so on.
     sealed : str, optional
-        SHA-256 of a sealed key that belongs to the arm's logs.
+        SHA-256 of the key of a blind trial (the hidden effects of the arm's logs).
     path : Path, optional
         File that the arm was read from.
     corrections : Corrections, optional
@@ -99,7 +99,7 @@ class Arm:
     controller : Controller, optional
         Position controller that tracks a planned motion; logs may hold its references in place of torques.
     tau_kind : {"command", "measured"}
-        Whether torques are commands, held until the next row, or measured, interpolated.
+        Whether logged torques are commands, held until the next sample, or measured torques, interpolated between samples.
     notes : tuple of str
         Remarks from reading the robot's description.
 

@@ -45,25 +45,26 @@ _MOST_BYTES = 2**20
 """Largest accepted size of an arm file, bytes: a thousand times what an arm file needs."""
 _FORMATS = "docs/formats.md, Arm file"
 _CLOSE_KIND = 0.75
-"""String similarity above which a known kind of arm is suggested for a misspelt one (`six-axis` and `axis`, different machines, have 0.67)."""
+"""String similarity above which a known kind of arm is suggested for a misspelt kind (`six-axis` and `axis`, different machines, have 0.67)."""
 _MARKUP = {"robot": "a URDF", "sdf": "an SDF model", "mujoco": "an MJCF model"}
 _KINDS = [*kinds(), SERIAL]
 _REMEDY_MARKUP = (
     f"make an arm file of it with armgap model, or write one of the kind {', '.join(_KINDS)}; see {_FORMATS}"
 )
-#: Standard deviations of parameters whose arm file states none, as a part of the value: a drawing is right to 10 %, friction to half.
+#: Standard deviations of parameters whose arm file states none, as a part of the parameter's value: inertial parameters from a drawing
+#: are right to 10 %, friction coefficients to half.
 _INERTIAL_SIGMA = 0.1
 _FRICTION_SIGMA = 0.5
 _LISTED = 40
-"""Names that an error message lists at most: all keys of a table, but not all links of a humanoid."""
-STRONGEST_GRAVITY = 30.0  # m/s^2
+"""Largest number of names that an error message lists: enough for all keys of a table, too few for all links of a humanoid."""
+STRONGEST_GRAVITY = 30.0  # largest accepted acceleration of gravity, m/s^2
 # Range of plausible sample periods [s]; a period outside the range is in another unit.
 SHORTEST_PERIOD_S = 1e-5
 LONGEST_PERIOD_S = 0.5
 
 
 class ArmFile:
-    """One arm file while it is checked."""
+    """Content of one arm file, with the checks of its keys and values."""
 
     tables: Mapping[str, tuple[str, ...]] = _TABLES
     scalars: tuple[str, ...] = _SCALARS
@@ -203,7 +204,7 @@ class ArmFile:
     def _sigma(self, table: dict[str, Any], key: str, values: NDArray[np.float64], share: float) -> NDArray[np.float64]:
         if key.split(".")[1] in table:
             return self._vector(table, key, len(values), above=0.0)
-        # A value of zero is trusted as far as the others are.
+        # A value of zero gets the standard deviation of a tenth of the largest value.
         typical = float(np.max(np.abs(values))) if np.any(values) else 1.0
         return share * np.where(values != 0, np.abs(values), 0.1 * typical)
 

@@ -1,4 +1,4 @@
-"""The position controller of an arm whose logs hold references in place of torques."""
+"""The position controller of an arm: it computes the torques of logs that hold references in place of torques."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ class Controller:
 
     @property
     def vectors(self) -> Iterator[tuple[str, NDArray[np.float64]]]:
-        """Names and values of the controller's settings that are given per joint."""
+        """Names and values, shape (n_joints,), of those settings in `VECTORS` that the controller has."""
         for name in VECTORS:
             if (values := getattr(self, name)) is not None:
                 yield name, values

@@ -300,14 +300,14 @@ CORRECTIONS: tuple[str, ...] = tuple(f.name for f in fields(Corrections))
 
 
 def _of(columns: Mapping[str, Any], names: Iterable[str]) -> list[Any]:
-    """Return those of the named arrays that the log has; a log of references has no torques."""
+    """Return the arrays in `columns` with the given names, without those that the log lacks, such as the torques of a log of references."""
     return [x for name in names if (x := columns[name]) is not None and x.shape[1]]
 
 
 def _shifted(t: Any, period: float, seconds: float) -> tuple[Any, Any]:
-    """Return the rows whose shifted torques are known, and the rows that hold these torques; each torque is held until the next row.
+    """Return the rows whose torques are known after a time shift by `seconds`, and the rows that hold these torques before the shift.
 
-    A shift by whole sample periods takes every torque to the row that many rows away, however the time stamps scatter.
+    Each torque is held until the next row. A shift by whole sample periods moves every torque by as many rows, however the time stamps scatter.
     """
     rows = np.arange(len(t))
     samples = seconds / period

@@ -35,7 +35,7 @@ class FreeSpace:
     boxes: Array
 
     def clearance(self, q: Array) -> tuple[Array, list[str]]:
-        """Return the distances between links and obstacles, and between links, in some poses, with the name of each pair.
+        """Return the distances between links and obstacles, and between links, in given poses, with the name of each pair of shapes.
 
         Distances are taken from points along each link, less half the spacing of the points, so that no obstacle lies between points unseen.
 
@@ -94,7 +94,7 @@ class FreeSpace:
         for length, radius, angle in zip(self.link_length, self.link_radius, np.cumsum(q, axis=1).T, strict=True):
             count = math.ceil(length / max(_STEP * radius, _FEWEST * length)) + 1
             along = np.linspace(0.0, length, count)
-            # Zero hangs straight down, angles grow towards +x.
+            # At position zero a link hangs straight down; angles grow towards +x.
             way = np.stack([np.sin(angle), -np.cos(angle)], axis=1)
             found.append((begin[:, None] + along[:, None] * way[:, None], length / (count - 1)))
             begin = begin + length * way

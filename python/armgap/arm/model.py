@@ -52,7 +52,7 @@ def read_model(
     trust : {"published", "cad", "guess", "none"}
         Level of trust in the description's masses and inertias, see `armgap.arm.serial.trust`.
     name : str, optional
-        Name of the arm; by default the description's.
+        Name of the arm; by default the name of the robot in the description.
     sample_period : float, default 0.002
         Nominal sample period of the logs [s], 1e-5 to 0.5.
 
@@ -84,7 +84,7 @@ def read_model(
         raise OptionError(f"the sample period is {sample_period:g} s", remedy=f"give {bounds} s")
     still = {joint: _finite(value, f"position of `{joint}`") for joint, value in (frozen or {}).items()}
     file = Path(path)
-    with np.errstate(over="ignore", invalid="ignore"):  # sizes are looked at in the end
+    with np.errstate(over="ignore", invalid="ignore"):  # `SerialArmFile` checks that all values are finite
         model = read_description(file, base=base, tip=tip, frozen=still)
     if gravity is not None:
         model = replace(model, chain=replace(model.chain, gravity=_vector(gravity)))

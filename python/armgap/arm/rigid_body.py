@@ -94,7 +94,7 @@ def moved(ten: Array, rotation: Array, translation: Array) -> Array:
     """
     mass, first = float(ten[0]), rotation @ ten[1:4]
     inertia = rotation @ symmetric(ten[4:]) @ rotation.T
-    # Parallel axes without the centre of mass, which a massless body does not have.
+    # Parallel axis theorem in first moments, because a massless body has no centre of mass.
     cross = np.outer(first, translation)
     inertia += (2.0 * float(first @ translation)) * np.eye(3) - cross - cross.T + _steiner(mass, translation)
     return np.concatenate([[mass], first + mass * translation, _six(inertia)])
@@ -188,5 +188,5 @@ def unit_axis(axis: Sequence[float] | Array) -> Array | None:
     length = float(np.linalg.norm(vector))
     if abs(length - 1.0) <= _UNIT:
         return vector
-    vector = vector / largest  # lengths whose squares are too small or too large
+    vector = vector / largest  # so that squares neither underflow nor overflow
     return vector / float(np.linalg.norm(vector))

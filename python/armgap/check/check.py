@@ -84,7 +84,7 @@ class Check:
         return " or ".join(self.remedies)
 
     def line(self, log: str | None = None) -> str:
-        """Return the check's result as one line of text; `log` is the log's name where the result has none."""
+        """Return the check's result as one line of text; `log` is the log's name to be used where the check names no log."""
         place = f"{name}: " if (name := self.log or log) else ""
         remedy = f"; {self.remedy}" if self.remedy else ""
         return f"{self.severity}: {place}{self.message}{remedy}"
@@ -116,5 +116,5 @@ class Check:
         )
 
     def of(self, log: str | None) -> Check:
-        """Return a copy of the check for another log."""
+        """Return a copy of the check with `log` as the name of its log; None for all logs."""
         return replace(self, log=log)

@@ -1,7 +1,7 @@
 """Contradictions between logs and arm file: a corrected reading of the columns explains the logs where the columns as logged do not.
 
-Two steps. The equation error of the arm within bounds costs a millisecond per reading and finds candidates (`screen`). Predictions over
-short windows, with the parameters re-estimated under the standard deviations of the arm file, decide (`confirm`). Both steps compare the
+The check has two steps. Equation errors with the arm's parameters within bounds cost a millisecond per reading and find candidates (`screen`).
+Predictions over short windows, with the parameters re-estimated with the arm file as prior, decide (`confirm`). Both steps compare the
 log as it stands with the log without the defect, and neither step has a rule for any single defect.
 """
 
@@ -44,18 +44,18 @@ READINGS: tuple[Callable[[Arm, float], Iterable[Reading]], ...] = (
     gravity_missing.readings,
     position_unit.readings,
 )
-"""Functions that yield the readings of the input to be tried, for an arm and the largest position in its logs."""
+"""Functions that yield the readings of the input to be tried, for an arm and the largest range of a joint's positions in its logs."""
 
 # A reading of the input is refitted if it lowers the mean log share of unexplained torque by this much. On logs of a simulator the right
 # reading wins by 0.17 to 4; on single logs of a real arm a wrong reading has won by up to 0.6, which predictions then refute.
 _SUSPICIOUS = 0.1
-# Readings of the input that are refitted at most.
+# Largest number of readings of the input that are refitted.
 _MOST_SUSPECTS = 3
 # A reading of the input is right if its prediction error is below this part of the prediction error with the log as it stands. Unmodelled effects
 # seldom change the RMS of wrong readings by less than a factor of two.
 BETTER = 0.7
 # Least decrease, with a right reading of the input, of the logarithms of prediction error and equation error together. Of 161 right readings on 14
-# cases, where an arm may have the parameters that the log as it stands suggests, the least are 1.3 (beside a drive that saturates), 1.9 and 2.1;
+# cases, where an arm may have the parameters that the log as it stands suggests, the least are 1.3 (with a drive that saturates), 1.9 and 2.1;
 # wrong readings of pieces of two runs of a real arm reach 0.73 and 0.86.
 _SAYS = 1.0
 # Largest ratio of a reading's prediction error to that of the log as it stands, where the log as it stands needs parameters outside the
@@ -70,7 +70,7 @@ EXPLAINS = 0.3
 _ACCOUNTS_FOR = 0.1
 # Prediction errors below this part of the motion count as none.
 _NEGLIGIBLE = 1e-3
-# Ratio of prediction errors up to which another reading, with an equation error equal to within `_SUSPICIOUS`, is named beside the best.
+# Ratio of prediction errors up to which another reading, with an equation error equal to within `_SUSPICIOUS`, is named with the best reading.
 _ALIKE = 1.05
 # Standard deviations beyond the bounds from which parameters count as impossible.
 _SURE = 3.0
@@ -78,7 +78,10 @@ _SURE = 3.0
 
 @dataclass(frozen=True)
 class Refit:
-    """An arm without effects, fitted to training logs and judged on the holdout; errors are RMS per joint [rad or m]."""
+    """An arm without effects, fitted to training logs and judged on the holdout.
+
+    `error` is the RMS prediction error and `motion` the RMS displacement within a window, per joint [rad or m].
+    """
 
     theta: NDArray[np.float64]
     sigma: NDArray[np.float64]
@@ -87,7 +90,7 @@ class Refit:
 
     @classmethod
     def of(cls, arm: Arm, training: Sequence[Log], holdout: Sequence[Log], horizon: float) -> Refit:
-        """Fit the arm's parameters to training logs, with prior from arm file and equation of motion, and judge the fit on the holdout."""
+        """Fit the arm's parameters to training logs, with arm file as prior and equation-error fit as second start, and judge them on the holdout."""
         errors = EquationError([Rows.of(log, arm) for log in training], arm)
         start = errors.fit(*bounds(arm)).theta if len(errors) else arm.theta
         found = _native.refit(
@@ -154,7 +157,7 @@ class Found:
 
 @dataclass(frozen=True)
 class Suspect:
-    """Candidate reading of the input, with a smaller equation error than the log as it stands."""
+    """Candidate reading of the input, its fit, and the decrease `gain` of the fit's cost relative to the log as it stands."""
 
     reading: Reading
     fit: Fit
@@ -162,7 +165,7 @@ class Suspect:
 
 
 def screen(base: EquationError, logs: Sequence[Log], arm: Arm) -> tuple[Fit, list[Suspect]]:
-    """Return the fit to the logs as they stand (`base`), and readings of the input with a smaller equation error, the best first."""
+    """Return the fit to the logs as they stand (`base`), and readings of the input with a smaller equation error, the smallest first."""
     low, high = bounds(arm)
     stands = base.fit(low, high)
     travel = max(float(np.ptp(log.q, axis=0).max()) for log in logs)
@@ -183,7 +186,7 @@ def _read(
     low: NDArray[np.float64],
     high: NDArray[np.float64],
 ) -> Fit:
-    """Return the equation error after logs and arm file are corrected for the one mistake that a reading supposes, such as a turned sign."""
+    """Return the fit to logs and arm file that are corrected for the one defect that a reading supposes, such as a reversed sign."""
     if reading.corrections.gravity is not None:
         weights = arm.gravity_parameters
         low, high = low.copy(), high.copy()
@@ -213,7 +216,7 @@ def confirm(
         return None
     as_is = Refit.of(arm, training, holdout, horizon)
     possible = as_is.possible(arm)
-    # Of an arm that hardly moves the log as it stands may be missed by many times the motion; that confirms no other reading.
+    # If the arm hardly moves, predictions of the log as it stands may miss by many times the motion; that confirms no other reading.
     no_worse_than_rest = as_is.bounded_by_motion()
     tried = []
     for suspect in suspects[:_MOST_SUSPECTS]:

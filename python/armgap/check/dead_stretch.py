@@ -23,9 +23,9 @@ _FORGOTTEN_S = 0.2
 # Ratio of the mean square residual of the equation of motion in a dead stretch to that elsewhere, and residual as a share of the joint's torque.
 _WORSE = 25.0
 _SHARE = 0.1
-# Time [s] within which stretches of constant torque begin that are judged together, by rows outside of all of them.
+# Largest time [s] between the beginnings of stretches of constant torque that are judged together, by rows outside of all stretches.
 _TOGETHER_S = 16.0
-# Rows of the equation of motion that a judgement of a stretch needs, inside and outside.
+# Smallest number of rows of the equation of motion, inside and outside of a stretch, by which the stretch is judged.
 _FEWEST = 30
 
 
@@ -67,13 +67,13 @@ def _constant(log: Log, j: int) -> list[tuple[int, int]]:
 
 
 def _judged(log: Log, arm: Arm, runs: list[Run], near: list[Run]) -> list[Check]:
-    """Judge the runs `near` by the residual of the equation of motion in the rows beside them that lie outside of all `runs`."""
+    """Return checks of those runs in `near` whose residual of the equation of motion is much larger than in rows nearby, outside of all `runs`."""
     rows = Rows.of(log, arm, around=(near[0][1], max(last for _, _, last in near)))
     dead = np.zeros((len(rows.y), log.n_joints), dtype=bool)
     alive = np.ones(len(rows.y), dtype=bool)
     when = log.t[rows.samples]
     for j, first, last in runs:
-        # The filters forget what was before, or what was missing, within this time.
+        # After this time the states of the filters no longer depend on the torques before or within the stretch.
         settled = log.t[first] + _FORGOTTEN_S
         dead[(when >= settled) & (when <= log.t[last]), j] = True
         alive &= (when < log.t[first]) | (when > log.t[last] + _FORGOTTEN_S)
@@ -112,7 +112,7 @@ def _check(log: Log, j: int, first: int, last: int, within: float, outside: NDAr
 
 
 def _merged(checks: list[Check]) -> list[Check]:
-    """Return one check per dead stretch: for the whole arm where all joints' torques are missing."""
+    """Return one check per dead stretch: of several joints whose torques are missing over the same rows, only that of the first."""
     by_rows: dict[tuple[tuple[int, int], ...], list[Check]] = {}
     for check in checks:
         by_rows.setdefault(check.rows, []).append(check)

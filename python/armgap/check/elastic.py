@@ -1,4 +1,4 @@
-"""Elastic torques beside an arm's equation of motion: any torque on a joint that never falls with position, such as a spring or contact."""
+"""Elastic torques added to an arm's equation of motion: any torque on a joint that never falls with position, such as a spring or contact."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ __all__ = ["beside_elasticity"]
 
 Array = NDArray[np.float64]
 
-# Alternating fits of model and elastic torques. An elastic torque that takes most of a torque is found in the first; after five no share changed by
-# more than 0.02 on nine development cases (columns of another arm 0.5 to 1.1, a spring 0.7 before and 0.09 after).
+# Number of alternating fits of model and elastic torques. An elastic torque that is most of a torque is found in the first fit; after five fits no
+# unexplained share changed by more than 0.02 on nine development cases (columns of another arm 0.5 to 1.1, a spring 0.7 before and 0.09 after).
 _TURNS = 5
-# Classes of position within which an elastic torque, any function that does not fall with position, is constant.
+# Number of classes of position within which an elastic torque, any function that does not fall with position, is constant.
 _CLASSES = 50
 
 

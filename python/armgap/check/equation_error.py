@@ -67,7 +67,7 @@ class Rows:
 
     @classmethod
     def of(cls, log: Log, arm: Arm, cutoff: float = CUTOFF, around: tuple[int, int] | None = None) -> Rows:
-        """Return the rows of a log; of a long log only those of a stretch in its middle, or of the samples `around` and some seconds beside them.
+        """Return the rows of a log; of a long log only those of a stretch in its middle, or of the samples `around` and some seconds on either side.
 
         `cutoff` is the cut-off of the filters [rad/s].
         """
@@ -103,7 +103,7 @@ class Fit:
     theta : ndarray, shape (n_parameters,)
         Estimated parameters [SI].
     share : ndarray, shape (n_joints,)
-        Mean square of each joint's residual over the mean square of its torque.
+        Mean square of each joint's residual, as a share of that of its torque or of the largest term of its equation of motion.
     """
 
     theta: Array
@@ -175,8 +175,8 @@ class EquationError:
     def noise_square(self, logs: Sequence[Log]) -> Array:
         """Return per joint the mean square of the torque that noise of the positions leaves unexplained, by the arm file's parameters.
 
-        Differences of third order keep the noise of `logs`, whose rows these are, and little of the motion: of white noise they have twenty times
-        the variance. The torque is the change of the rows under as much further noise.
+        The noise is estimated from third differences of the positions in `logs`, from which the rows were made: these differences hold little of the
+        motion, and twenty times the variance of white noise. The torque is the change of the rows when as much noise is added to the positions.
         """
         rng = np.random.default_rng(0)
         left = np.zeros(len(self.scale))

@@ -36,9 +36,9 @@ Array = NDArray[np.float64]
 # Half width of a test function [s], and at least so many sample periods.
 _HALF_WIDTH_S = 0.05
 _FEWEST_PERIODS = 5
-# Intervals of all logs together in the regression at most: some ten seconds of a robot's log tell a sign.
+# Largest number of sample intervals in the regression, all logs together: some ten seconds of a robot's log tell a sign.
 _MOST_INTERVALS = 4000
-# Rows per independent one: neighbouring test functions overlap and residuals are correlated over some tenths of a second.
+# Number of rows that count as one independent row: neighbouring test functions overlap, and residuals are correlated over some tenths of a second.
 _CORRELATED = 12.0
 # Iterations in which the weights of the joints are set from their residuals.
 _ROUNDS = 4
@@ -54,7 +54,7 @@ _RESTORED = 36.0
 # `_EXPLAINS` of every joint's mean square torque stays unexplained, or half of the share with the log as it stands.
 _BETTER = 1.0
 _EXPLAINS = 0.15
-# Largest mass of a load as a multiple of the last link's mass.
+# Factor on the standard deviations of the last link's inertial parameters for an unknown load: its largest mass in masses of the last link.
 _LOADED = 30.0
 # Increase of the cost up to which a torque's factor is set to 1: friction alone determines no factor.
 _UNDECIDED = 10.0
@@ -80,7 +80,7 @@ _READINGS: tuple[Callable[[Arm, float], Iterable[Reading]], ...] = (
 
 @dataclass(frozen=True)
 class Fit:
-    """A regression of torques on the arm's parameters.
+    """Result of a regression of torques on the arm's parameters.
 
     Attributes
     ----------
@@ -121,12 +121,12 @@ def contradictions(logs: Sequence[Log], arm: Arm, *, repair: bool = True) -> tup
     """
     commanded = not all(log.has_torques for log in logs)
     if commanded and (arm.controller is None or arm.controller.ki is not None):
-        # What an integral part held before a log began is in no column.
+        # The value of the controller's integral part at the start of a log is in no column.
         return Corrections(), []
     stands = fit(logs, arm)
     if stands is None or (stands.share.max() < _SUSPICIOUS and stands.distance < _FAR * arm.n_joints):
         return Corrections(), []
-    # A load on the last link is no contradiction: what it explains no other reading is asked for.
+    # A load on the last link is no contradiction: no other reading is tried for torques that a load explains.
     loaded = fit(logs, _with_load(arm))
     if loaded is not None and loaded.cost < stands.cost:
         stands = loaded
@@ -142,7 +142,7 @@ def contradictions(logs: Sequence[Log], arm: Arm, *, repair: bool = True) -> tup
         if _is_right(stands, least):
             remedies = _alike(best, least.cost + _ALIKE * (stands.cost - least.cost), logs, arm)
             return best.corrections, [_contradiction(stands, best, least, found, remedies)]
-    # Torques of a controller have the unit of its gains.
+    # Torques that are computed by a controller have the unit of its gains, so no factor is sought.
     scaled = None if commanded else _factors(logs, arm)
     if scaled is None or not _is_right(stands, scaled[1]):
         return Corrections(), []
@@ -196,7 +196,7 @@ def _rescaled(stands: Fit, factors: Array, found: Fit, *, repair: bool) -> tuple
 
 
 def _alike(best: Reading, most: float, logs: Sequence[Log], arm: Arm) -> list[str]:
-    """Return the remedies of the best reading: its own, and those of other readings that explain the logs equally well.
+    """Return those remedies of the best reading that explain the logs equally well: the first, and others with a cost below `most`.
 
     On planar arms the equation of motion is odd in positions and torques together, so that a sign can be corrected on either;
     on serial arms this holds only where the chain is its own mirror image.
@@ -213,7 +213,7 @@ def _alike(best: Reading, most: float, logs: Sequence[Log], arm: Arm) -> list[st
 
 
 def _of_options(remedy: str) -> Corrections | None:
-    """Return the corrections that a remedy such as ``--flip q1,tau2`` stands for; None for a remedy that is no option."""
+    """Return the corrections that a remedy such as ``--flip q1,tau2`` stands for; None for a remedy that is no command-line option."""
     words = remedy.split()
     if len(words) % 2 or any(word not in ("--flip", "--zero", "--swap") for word in words[::2]):
         return None
@@ -236,7 +236,10 @@ def _offered(logs: Sequence[Log], arm: Arm) -> Iterator[Reading]:
 
 @dataclass(frozen=True)
 class _Rows:
-    """Torques, shape (rows, n), and products of their regressors for the normal equations, joint by joint."""
+    """Torques `y`, shape (n_rows, n_joints), their sums of squares `square`, and the normal equations of each joint.
+
+    With `psi` the regressor of a joint, `normal` holds ``psi' psi`` and `right` holds ``psi' y``, first axis the joint.
+    """
 
     y: Array
     square: Array
@@ -245,7 +248,7 @@ class _Rows:
 
     @classmethod
     def of(cls, logs: Sequence[Log], arm: Arm) -> _Rows | None:
-        """Return the rows of some logs; None where the logs hold too few samples, or no joint has a torque."""
+        """Return torques and normal equations of given logs; None where the logs hold too few samples, or no joint has a torque."""
         if arm.chain is None:
             return None
         chain = arm.chain.native()
@@ -281,7 +284,7 @@ class _Rows:
             left = np.maximum(square + explained, 1e-8 * square)
         distance = float((precision * (theta - arm.theta) ** 2).sum())
         share = np.where(moved, left / square, 0.0)
-        # Measured from one part in 10,000, below which a joint's torque is as good as explained.
+        # The likelihood counts unexplained shares relative to one part in 10,000, below which a joint's torque counts as explained.
         likelihood = count / _CORRELATED * float(np.log(np.maximum(share[moved], 1e-4) / 1e-4).sum())
         return Fit(likelihood + distance, share, distance, count / _CORRELATED)
 

@@ -22,23 +22,23 @@ __all__ = ["Examined", "examine", "unexplained_columns"]
 
 Array = NDArray[np.float64]
 
-# Readings whose mean log share of unexplained torque differs by less are told apart by predictions. A reading that explains less by
-# this much than springs and contacts do is rejected; not the reverse, for wrongly read gravity is equivalent to a spring in many logs.
+# Difference of the mean log shares of unexplained torque of two readings below which predictions decide between them. A reading that explains less
+# than springs and contacts do, by this much, is rejected; not the reverse, for wrongly read gravity is equivalent to a spring in many logs.
 _CLOSE = 1.0
 # Rows of the equation of motion that the comparison of readings needs.
 _FEWEST_ROWS = 100
-# Torque and position columns do not belong together if this share of what moves a joint (its torque, or the largest term of its equation of motion)
-# stays unexplained and predictions miss by this part of the motion; or, with the second pair, if the share of a driven joint's torque does and the
-# best model with the library's effects misses by as much: the stronger one sign, the weaker the other may be. Effects of the library leave less than
-# a tenth of a torque on simulated logs, but a stiff hardening spring 0.38, and less than a quarter on logs of a real arm; a torque of which a third
-# is noise was predicted to 0.001. Torques played backwards leave 0.3 to 1.1 and are missed by 0.42 to 2.2 (18 development cases), by 0.28 of the
-# motion at most where an effect is hidden.
+# Thresholds above which torque and position columns do not belong together. First numbers: unexplained share of what moves a joint (its torque, or
+# the largest term of its equation of motion), and prediction error as a part of the motion; second numbers: unexplained share of a driven joint's
+# torque, and prediction error of the best model with the library's effects. Effects of the library leave less than a tenth of a torque on simulated
+# logs, but a stiff hardening spring 0.38, and less than a quarter on logs of a real arm; a torque of which a third is noise was predicted to 0.001.
+# Torques in reversed time order leave 0.3 to 1.1 and have prediction errors of 0.42 to 2.2 of the motion (18 development cases), of 0.28 at most
+# where an effect is hidden.
 _UNRELATED = (0.5, 0.25)
 _UNPREDICTED = (0.3, 0.4)
 # A joint is driven if its torque's mean square exceeds this part of that of the largest term of its equation of motion; a joint that is
 # not driven, as the passive joint of an acrobot, has no torque to be explained.
 _DRIVEN = 0.1
-# Shifts of the torques [samples] with which good predictions are no sign that torques and positions belong to different motions.
+# Shifts of the torques [samples] that are tried first: torques and positions that predict well with one of them belong to the same motion.
 _SHIFTS = (-8, -5, -2, 2, 5, 8)
 
 
@@ -159,9 +159,9 @@ def unexplained_columns(
 def _strangers(share: Array, now: Examined, horizon: float, pair: int) -> list[Check]:
     """Return a check that torques and positions do not belong together, by pair `pair` of the thresholds `_UNRELATED`.
 
-    The check is returned where parameters with the arm file's signs leave a part of a torque unexplained (`share` per joint), even beside
-    springs and contacts or behind a drive that saturates far below its command, and do not predict the motion even with shifted torques. What
-    noise of the positions leaves of a torque is not counted.
+    The check is returned where parameters with the arm file's signs leave a part of a torque unexplained (`share` per joint), even together with
+    springs and contacts or with a drive that saturates far below its command, and do not predict the motion even with shifted torques. The part
+    of a torque that noise of the positions leaves unexplained is not counted.
     """
     worst = int(np.argmax(share))
     logs = [*now.training, *now.holdout]

@@ -31,17 +31,18 @@ _CUTOFF = 10.0
 # Smallest shift of the torques that counts, in samples. On simulated logs with hidden effects the estimate is -0.25 to 0.85 samples off, and
 # a lag of a drive cannot make the shift negative.
 _COUNTS = 0.6
-# Share of the halves of all logs that have to agree on a shift, each with at least half of it.
+# Share of the halves of all logs that have to agree on late torques, each half with a shift of at least half of `_COUNTS`.
 _AGREEING = 0.75
 # Largest ratio of prediction errors with the shift to prediction errors without it.
 _AS_GOOD = 1.02
-# A shift by one more sample has to lower the prediction errors to the first number, the first sample of shift to the second. On 24 development cases
-# torques late by one sample gave 0.01 to 0.72, but for four where an unmodelled effect hides it (0.99 to 1.07); on 180 logs in order the least ratios
-# were 0.87 and 0.89.
+# Largest ratio of prediction errors with one more sample of shift to those without it, and largest ratio for the first sample of shift. On 24
+# development cases torques late by one sample gave 0.01 to 0.72, but for four where an unmodelled effect hides the shift (0.99 to 1.07); on 180 logs
+# without this defect the least ratios were 0.87 and 0.89.
 _CLEARLY = 0.9
 _AT_FIRST = 0.8
 # Largest ratio of prediction errors with the shift to those without it, for torques that come early where no delays were named. On three
-# arms without effects and torques early by three samples they missed by 0.008 to 0.11; a delay of one joint of two makes the other joint worse.
+# arms without effects and with torques early by three samples the ratio was 0.008 to 0.11; for a delay of one joint of two the shift makes
+# predictions of the other joint worse.
 _MOSTLY = 0.5
 # Share of unexplained torque that counts as zero when shifts of the torques are compared.
 _EXACT = 1e-7
@@ -50,13 +51,13 @@ _FEWEST = 200
 # Delays of all joints are one shift of the file if they differ by less than this part of a sample, or of their standard deviations.
 _EQUAL = 0.5
 _EQUAL_SIGMAS = 3.0
-# Delays of all joints that make up this part of a repaired shift take it back. Where hysteresis had passed for late torques the delays made up all of
-# the shift (0.99 and 1.00, two cases); a true shift leaves at most the fraction of a sample by which it was rounded.
+# Share of a repaired shift from which delays that a diagnosis names on all joints revoke the repair. Where hysteresis had been taken for late
+# torques, the delays were all of the shift (0.99 and 1.00, two cases); a true shift leaves at most the fraction of a sample by which it was rounded.
 _TAKEN_BACK = 0.7
 
 
 def acausal(logs: Sequence[Log], arm: Arm) -> int | None:
-    """Return by how many samples the torques of all logs come late in the file; 0 if only some logs say so, None if none does."""
+    """Return by how many samples the torques of all logs come late in the file; 0 if only a part of the logs shows it, None if none does."""
     curves = [_curve(half, arm) for log in logs for half in _halves(Rows.of(log, arm, _CUTOFF))]
     says = [-_minimum(curve) > 0.5 * _COUNTS for curve in curves]
     if not any(says):
@@ -76,7 +77,7 @@ def _halves(rows: Rows) -> list[Rows]:
 
 
 def _curve(rows: Rows, arm: Arm) -> NDArray[np.float64]:
-    """Return the negative log-likelihood of every shift that is tried, joints weighted by their unexplained torque."""
+    """Return the negative log-likelihood of every shift from -8 to 8 samples, with joints weighted by their unexplained torque."""
     low, high = bounds(arm)
     count = len(rows.y)
     inner = slice(_LARGEST, count - _LARGEST)
@@ -97,9 +98,9 @@ def _minimum(costs: NDArray[np.float64]) -> float:
 def confirmed(
     samples: int, training: Sequence[Log], holdout: Sequence[Log], arm: Arm, horizon: float
 ) -> Corrections | None:
-    """Return the shift of torques that predictions prefer, or None; `samples` is the shift by the equation of motion.
+    """Return the shift of torques that predictions prefer, or None; `samples` is the shift [samples] by the equation of motion.
 
-    From `samples` the shift grows, a sample at a time, for as long as predictions clearly improve. Beside a large unmodelled effect predictions
+    From `samples` the shift changes by one sample at a time for as long as predictions clearly improve. With a large unmodelled effect predictions
     hardly change with a shift, so a shift by several samples is accepted unless predictions get worse. A shift by one sample may come from
     an effect, so it is accepted only if predictions are clearly worse on either side. A shift that needs parameters outside the bounds, or that
     predicts worse than no motion at all would, is rejected.
@@ -135,10 +136,10 @@ def taken_back(causes: Sequence[Mapping[str, Any]], n_joints: int, shift: float)
 
 
 def explains_better(unshifted: Mapping[str, Any], shifted: Mapping[str, Any]) -> bool:
-    """Return whether a diagnosis without a repaired shift leaves clearly smaller prediction errors than the one with it (`gap` of both).
+    """Return whether a diagnosis of unshifted logs leaves clearly smaller prediction errors than the diagnosis of logs with a repaired shift.
 
-    Presliding friction turns a joint's torque back before its velocity, as torques do that come late; a repair that leaves a gap unexplained is
-    therefore compared with the effects of the library on the log as it stands.
+    Both arguments are the `gap` of a diagnosis. With presliding friction a joint's torque reverses before its velocity, as with torques that come
+    late in the file; a repair that leaves a gap unexplained is therefore compared with the effects of the library on the log as it stands.
     """
     ratios = [a / max(b, np.finfo(float).tiny) for a, b in zip(unshifted["after"], shifted["after"], strict=True)]
     return math.exp(float(np.mean(np.log(np.maximum(ratios, np.finfo(float).tiny))))) < BETTER

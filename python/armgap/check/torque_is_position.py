@@ -19,15 +19,15 @@ __all__ = ["find"]
 
 # Units of a position reference whose positions are in rad: rad, degrees, turns.
 _UNITS = (1.0, 180.0 / np.pi, 0.5 / np.pi)
-# A reference follows the position by a factor this near to one, and from an equal zero to this part of the travel.
+# Largest deviation from 1 of the factor between position and reference, and largest offset between the two as a part of the travel.
 _NEAR_ONE = 0.15
 _NEAR_ZERO = 0.15
 # Longest response time of a servo [s]: its inertia term is smaller than this time squared. A hanging arm swings more slowly.
 _SLOWEST = 0.1
-# Share of the column's variance that the servo's equation may leave, relative also to what the arm's own equation leaves.
+# Largest share of the column's variance that the servo's equation may leave, and largest ratio to the share that the equation of motion leaves.
 _LEFT = 0.05
 _BETTER = 0.2
-# Samples of a log that are used at most.
+# Largest number of samples of a log that are used.
 _MOST = 4000
 
 
@@ -52,7 +52,7 @@ def find(logs: Sequence[Log], arm: Arm) -> list[Check]:
 
 
 def _in_any_unit(base: EquationError, arm: Arm) -> NDArray[np.float64]:
-    """Return per column the unexplained share of its variance as a torque in any unit."""
+    """Return per torque column the share of its variance that the equation of motion leaves unexplained, if the torque may have any unit."""
     factors = base.expected()
     if np.any(factors <= 0):
         return np.ones(len(factors))
@@ -60,7 +60,7 @@ def _in_any_unit(base: EquationError, arm: Arm) -> NDArray[np.float64]:
 
 
 def _servo(log: Log, j: int) -> float:
-    """Return the share of a torque column's variance that the servo's equation leaves; 1 if the column is no reference of a servo."""
+    """Return the share of a torque column's variance that ``q + a dq + b ddq`` leaves; 1 if the column is no position reference of a servo."""
     t, q, tau = log.t[:_MOST], log.q[:_MOST, j], log.tau[:_MOST, j]
     variance = float(np.var(tau))
     if variance == 0 or np.ptp(q) == 0:

@@ -24,8 +24,8 @@ from armgap.several_joints import by_joint
 
 __all__ = ["LIMITED", "Factors", "find", "limited", "refined", "said"]
 
-# Share of a joint's torque below which the joint is explained by a limit of its drive. Drives that are limited leave 0.03 at most, torques played
-# backwards 0.31 and more at their best limit of size or rate (four development cases each).
+# Share of unexplained torque below which a limit of the drive explains a joint. Drives that are limited leave 0.03 at most, torques in reversed time
+# order 0.31 and more at their best limit of size or rate (four development cases each).
 LIMITED = 0.2
 
 
@@ -33,7 +33,7 @@ LIMITED = 0.2
 _GAIN = 2.0
 # Common factor on all columns that the arm file's parameters may be off by, up or down.
 _SCALED = 4.0
-# Largest factor on a torque that is repaired; larger ones are no plausible unit.
+# Largest factor on a torque that is repaired; larger factors are no plausible unit.
 _LARGEST = 2e3
 # Columns share a factor if their factors differ by less than this ratio.
 _ALIKE = 1.5
@@ -44,11 +44,11 @@ _ROUNDS = 4
 # to agree: friction without bound takes much of a torque in another unit.
 _GAIN_IN_COST = 0.2
 _CLEAR_GAIN = 0.5
-# Share of unexplained torque above which a joint says nothing of a factor: noise fed back by a controller, or a stop, makes most of its torque.
+# Share of unexplained torque above which a joint determines no factor: noise fed back by a controller, or a stop, makes most of its torque.
 _LEFT = 0.3
-# Where a factor leaves this share of a torque, a limit of the drive or an elastic torque is tried beside it, and taken where it halves that share:
+# Where a factor leaves this share of a torque, a limit of the drive or an elastic torque is added to the model, and kept where it halves that share:
 # sound logs and factors alone leave 0.02 at most, drives that saturate 0.2 to 0.6 and behind their limit 0.01 to 0.05 (five development cases of six;
-# 0.35 in one that is hardly ever below its limit), springs and stops 0.1 to 0.4 and less than 0.03 beside the elastic torque (three of five). Where
+# 0.35 in one that is hardly ever below its limit), springs and stops 0.1 to 0.4 and less than 0.03 with the elastic torque (three of five). Where
 # that share stays, predictions have to agree: friction without bound and another size of all torques have left 0.14 to 0.25 of two runs of a real arm
 # whose torques were in newton metres.
 _CHANGE_TRIED = 0.1
@@ -59,8 +59,9 @@ _SURE = 3.0
 _LEAST_SHARE = 1e-3
 # Quantiles of a torque's size at which a drive's limit is tried: a limit between two quantiles still explains what no factor does.
 _LEVELS = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95)
-# Times in which a drive may take its torque through the range of its commands [s]: steps of a fourth, from what shows in no log to what leaves a
-# constant torque. A rate between two of them is met to 12 %, which leaves far less than what columns of another arm do.
+# Times [s] that a drive with a limited rate of torque may need for the range of its commands, each a quarter longer than the one before: the shortest
+# shows in no log, the longest leaves a constant torque. A rate between two of them is met to 12 %, which leaves far less torque unexplained than
+# columns of another arm do.
 _SLEW_TIMES = tuple(0.05 * 1.25**k for k in range(25))
 
 
@@ -101,7 +102,7 @@ def find(base: EquationError, logs: Sequence[Log], arm: Arm) -> Factors | None:
     applied = np.where(np.isin(np.arange(len(factors)), odd), factors, 1.0)
     if shared:
         odd = list(range(len(factors)))
-        # Where a limit lies is known to some percent, and the factor behind it no better.
+        # A drive's limit is known to some percent, and the factor of a joint with a limited drive no better.
         says = known & ~read.changed if np.any(known & ~read.changed) else known
         applied = np.full(len(factors), _common(factors[says], read.share[says]))
     fit = base.with_factors(low, high, applied)
@@ -117,9 +118,9 @@ def find(base: EquationError, logs: Sequence[Log], arm: Arm) -> Factors | None:
 
 
 def _friction_stands(base: EquationError, arm: Arm, factor: float) -> bool:
-    """Return whether friction is that of the arm file in the torques as logged and is not in the scaled ones.
+    """Return whether friction agrees with the arm file in the torques as logged and disagrees in the scaled torques.
 
-    A payload scales inertias and weights, another unit of the torques friction too.
+    A payload scales inertias and weights only, another unit of the torques scales friction too.
     """
     b = arm.n_inertial
     friction = base.fit(*bounds(arm)).theta[b:]
@@ -146,7 +147,7 @@ def limited(logs: Sequence[Log], arm: Arm, joint: int) -> tuple[EquationError, F
 
 @dataclass(frozen=True)
 class _Reading:
-    """Factors of torques, unexplained share of each torque, and joints with torques limited in size or rate or less an elastic torque."""
+    """Equation error, factor and unexplained share of each torque, and mask of the joints with a limit of the drive or an elastic torque."""
 
     errors: EquationError
     factors: NDArray[np.float64]
@@ -168,8 +169,8 @@ class _Reading:
 def _read(base: EquationError, logs: Sequence[Log], arm: Arm) -> _Reading:
     """Return the factors of the torques, with limits of drives and elastic torques tried where factors alone leave much torque unexplained.
 
-    A column in another unit may stand before a drive that is limited, or on a joint with a spring or a stop: such a joint's factor is
-    identifiable only behind the limit, or beside the elastic torque.
+    A column in another unit may be the command of a drive that is limited, or of a joint with a spring or a stop: such a joint's factor is
+    identifiable only together with the limit, or with the elastic torque.
     """
     low, high = bounds(arm, _TRUST)
 

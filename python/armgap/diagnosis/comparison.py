@@ -1,4 +1,4 @@
-"""Two diagnoses of one arm compared, as before and after a repair: gap, causes, parameters."""
+"""Comparison of two diagnoses of one arm, such as before and after a repair: gap, causes, parameters."""
 
 from __future__ import annotations
 
@@ -27,16 +27,16 @@ SIGMAS, SHARE = 3.0, 0.02
 
 @dataclass(frozen=True)
 class GapChange:
-    """The gap of one model, RMS per joint before and after.
+    """The gap of one model in the earlier and in the later of two diagnoses.
 
     Attributes
     ----------
     model : {"before", "refit", "after"}
         Model with the arm file's parameters, with re-estimated parameters, or with the causes; as in `Gap`.
     before, after : tuple of float
-        RMS position error per joint [rad or m].
+        RMS position error per joint [rad or m] in the earlier and in the later diagnosis.
     factor : float or None
-        Ratio of the gap above the noise floor, all joints, after to before; None if there was no gap before.
+        Ratio of the gap above the noise floor, over all joints, in the later diagnosis to that in the earlier; None if there was no gap before.
     """
 
     model: str
@@ -85,7 +85,7 @@ class ParameterChange:
     name : str
         Name of the parameter.
     before, after : Value
-        Estimates.
+        Estimates of the earlier and of the later diagnosis.
     sigmas : float or None
         Difference in standard deviations of the difference; None if no standard deviation is known.
     changed : bool
@@ -101,7 +101,7 @@ class ParameterChange:
 
 @dataclass(frozen=True)
 class Comparison:
-    """The result of `compare`.
+    """Result of `compare`: changes of gap, causes and parameters between two diagnoses of one arm.
 
     Attributes
     ----------

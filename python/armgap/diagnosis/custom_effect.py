@@ -120,7 +120,7 @@ class TorqueTables:
         return data
 
     def applied(self, data: dict[str, Any], logs: Sequence[Log]) -> tuple[dict[str, Any], list[Log]]:
-        """Return a diagnosis without custom causes, and logs with their torques added, for code that knows only the library's effects."""
+        """Return a diagnosis without custom causes, and logs with the torques of these causes added, for code that knows only library effects."""
         custom = {e.name: (i, e.joint) for i, e in enumerate(self.effects)}
         found = [c for c in data["causes"] if c["effect"] in custom]
         if not found:

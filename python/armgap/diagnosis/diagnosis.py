@@ -32,9 +32,9 @@ from armgap.progress import ProgressCallback, report_progress, use_callback
 
 __all__ = ["InputSummary", "LogRemark", "diagnose"]
 
-#: Suffixes that name a part or a stretch of a log, after the log's own name.
+#: Pattern of the suffixes that name a part or a stretch of a log, after the log's own name.
 _WHOLE = re.compile(r"( \((first|last) part\))?( \(\S+ to \S+ s\))?$")
-#: Suffix that names a stretch of a log, after the log's own name.
+#: Pattern of the suffix that names a stretch of a log, after the log's own name.
 _STRETCH = re.compile(r" \(\S+ to \S+ s\)$")
 MOST_CAUSES = 1000
 """Largest number of causes that may be asked for: more than the library can name on any arm."""
@@ -142,7 +142,7 @@ def _diagnose(given: PreparedInput, settings: dict[str, Any], effects: Sequence[
     training, held, arm = given.training, given.holdout, given.arm
     contradictory = any(check.severity == "error" for check in given.checks)
     if contradictory:
-        # No effect is asked to explain a contradiction: the figures are those of the arm's own parameters.
+        # No effect is fitted to contradictory input: the gap is that of the arm with re-estimated parameters.
         settings = settings | {"max_causes": 0}
     tables = TorqueTables.of(effects, training, held)
     settings = settings | {"own": [e.joint - 1 for e in effects]}
@@ -251,7 +251,7 @@ def _ambiguous_delay(data: dict[str, Any], training: list[Log], arm: Arm) -> lis
 
 
 def _hidden_delay(data: dict[str, Any], given: PreparedInput) -> list[Check]:
-    """Return a warning that torques come late or early in the file, as predictions say where a gap is unexplained or all joints have equal delays."""
+    """Return a warning that torques stand too early in the file, by predictions, if the gap is unexplained or all joints have delays or lags."""
     late = {c["joint"] for c in data["causes"] if c["effect"] in ("actuator_delay", "actuator_lag")}
     asked = data["verdict"] == "unexplained" or len(late) == given.arm.n_joints > 1
     if not asked or given.arm.chain is not None or any(check.check == "time_shift" for check in given.checks):

@@ -39,7 +39,7 @@ _REACH = 4.0
 _EARLIEST_S, _LATEST_S = -0.05, 0.1
 # Step of the grid of delays, in standard deviations of the Gaussian kernel: within a step the cost is a parabola.
 _GRID = 0.25
-# Gauss-Newton iterations for a drive's delay; from within a step of the grid it has converged to 1e-6 s after four.
+# Gauss-Newton iterations for a drive's delay; from within a step of the grid the delay has converged to 1e-6 s after four iterations.
 _ROUNDS = 8
 # Length of a hole in the samples, in sample periods, at which a log is split, equal to that for the equation of motion.
 _HOLE = 3.0
@@ -93,7 +93,7 @@ class _Stretch:
         kernel /= kernel.sum()
         rate = -s / sigma**2 * kernel
         curvature = (s**2 / sigma**4 - 1 / sigma**2) * kernel
-        curvature -= curvature.mean()  # a constant has none, however the kernel is cut
+        curvature -= curvature.mean()  # a constant has zero second derivative, also with a truncated kernel
         impulse = np.concatenate([[0.0], np.cumsum(tau[:-1] * np.diff(t))])
         edges = np.append(even - 0.5 * step, even[-1] + 0.5 * step)
         held = np.diff(np.interp(edges, t, impulse)) / np.diff(np.clip(edges, t[0], t[-1]))
@@ -113,7 +113,7 @@ class _Stretch:
         return np.stack([tau, np.ones_like(tau), -self.dq[self.inner], -self.ddq[self.inner]], axis=1)
 
     def by_delay(self, delay: float, gain: float) -> Array:
-        """Return the derivative of the modelled torque by the delay, shape (n_inner,)."""
+        """Return the derivative of the modelled torque by the delay [N m/s or N/s], shape (n_inner,)."""
         return -gain * np.interp(self.t[self.inner] - delay, self.t, self.tau_rate)
 
     @property
@@ -180,7 +180,7 @@ class Drive:
         return cls(joint, values, scatter)
 
     def left(self, logs: Sequence[Log]) -> tuple[float, float]:
-        """Return the RMS over some logs of measured less commanded, and of measured less modelled torque [N m], smoothed by the Gaussian kernel."""
+        """Return the RMS over `logs` of measured less commanded, and of measured less modelled torque [N m], smoothed by the Gaussian kernel."""
         stretches = [stretch for log in logs for stretch in _stretches(log, self.joint)]
         if not stretches:
             return 0.0, 0.0
@@ -216,7 +216,7 @@ def _jacobian(stretch: _Stretch, values: Array) -> Array:
 
 
 def _scatter(rows: Array, residual: Array, groups: NDArray[np.intp]) -> Array:
-    """Return standard deviations of least-squares estimates for residuals correlated within groups only, shape (n_parameters,)."""
+    """Return standard deviations of least-squares estimates for residuals that are correlated only within groups of rows, shape (n_parameters,)."""
     _, group = np.unique(groups, return_inverse=True)
     count = int(group.max()) + 1
     if count < 2:

@@ -5,8 +5,8 @@ removes the drive from the prediction, and the position `q_link` of a second enc
 transmission. The arm's parameters are re-estimated each time. With S the signals in use and E_j(S) the RMS error that is left at joint j,
 
     whole gap             E2 = sum_j E_j()^2, nothing replaced
-    drive, transmission   what the replacement of the joint's signal takes off sum_j E_j(S)^2, over E2; in turns, always the signal that
-                          takes most, for as long as it takes `LEAST_SHARE` of the whole
+    drive, transmission   decrease of sum_j E_j(S)^2 by the replacement of the joint's signal, over E2; signals are replaced one by one, the
+                          one with the largest decrease first, as long as the decrease is at least `LEAST_SHARE` of E2
     sensor                min(floor_j, E_j(S))^2 / E2 at the end, with the error `floor_j` that the sensors' own noise makes
     mechanics             (E_j(S)^2 - floor_j^2) / E2 at the end, where that is above zero
 
@@ -36,13 +36,13 @@ __all__ = ["LEAST_SHARE", "ChainEntry", "drive_chain"]
 Array = NDArray[np.float64]
 
 LEAST_SHARE = 0.05
-"""Share of the gap from which a stage is listed, and a measured signal used: ideal drives on 12 sets of simulated logs take up to 0.04 by chance."""
+"""Share of the gap from which a stage is listed, and a measured signal used; on 12 sets of simulated logs ideal drives have up to 0.04 by chance."""
 
 # Weight of the sample at the end of an interval in the measured torque over the interval: held, linear, or measured before the new command.
 _HELD, _STRAIGHT, _ENDED = 0.0, 0.5, 1.0
-# Delay of a drive, in sample periods, below which it counts as none: samples do not show when between them a measured torque changes.
+# Delay of a drive, in sample periods, below which it counts as none: samples do not show at which time between them a measured torque changes.
 _AT_ONCE = 0.6
-# A second encoder whose position differs from the first encoder's by less than this part of the motion tells nothing of a transmission.
+# Difference of the positions of the two encoders, as a part of the motion, below which the second encoder shows nothing of a transmission.
 _APART = 1e-9
 
 
@@ -85,7 +85,7 @@ class _Signal:
         if self.stage == "transmission":
             assert log.q_link is not None
             q = log.q.copy()
-            # Two encoders seldom count from the same place: the mean between them is no deflection.
+            # The zeros of two encoders are seldom equal: their mean difference is no deflection.
             q[:, self.joint] = log.q_link[:, self.joint] - np.mean(log.q_link[:, self.joint] - q[:, self.joint])
             return replace(log, q=q)
         assert log.tau_meas is not None
@@ -117,7 +117,7 @@ class _Case:
         return np.zeros(self.arm.n_joints) if found is None else np.nan_to_num(np.maximum(found.share, 0.0))
 
     def signals(self) -> Iterator[_Signal]:
-        """Yield the measured signals that all logs hold besides command and position; none for an arm with a position controller."""
+        """Yield the measured signals that all logs hold besides command and position; none if a log holds references in place of torques."""
         logs = [*self.training, *self.holdout]
         if not all(log.has_torques for log in logs):
             return
@@ -169,7 +169,7 @@ def drive_chain(
     drives = {s.joint: Drive.identify(training, s.joint) for s in signals if s.stage == "drive"}
     gains, left, whole = _replaced(case, signals)
     if not np.isfinite(whole):
-        return []  # predictions that diverge are no measure
+        return []  # diverging predictions give no measure of the gap
     noise = np.minimum(np.zeros(arm.n_joints) if arm.chain is not None else np.square(floor), left)
     shares = {
         **{(s.stage, s.joint): 0.0 for s in signals},

@@ -31,7 +31,10 @@ _HELD_OUT = 0.4
 
 @dataclass(frozen=True)
 class PreparedInput:
-    """Prepared logs and arm of a diagnosis, with the checks to report."""
+    """Prepared logs and arm of a diagnosis, with the checks to report.
+
+    `factors` are the repaired factors by torque column, `shift` the repaired time shift of the torques [s], 0 without a repair.
+    """
 
     training: list[Log]
     holdout: list[Log]

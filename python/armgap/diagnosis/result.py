@@ -52,7 +52,10 @@ class Values:
 
 @dataclass(frozen=True)
 class GapAtHorizon:
-    """RMS position error per joint on the holdout at one prediction horizon [s]; fields as in `Gap` [rad or m]."""
+    """RMS position errors per joint [rad or m] on the holdout at the prediction horizon `horizon_s` [s], for the models in `Gap`.
+
+    `before`: arm file; `refit`: parameters re-estimated; `after`: with the named causes; `floor`: measurement noise alone.
+    """
 
     horizon_s: float
     before: tuple[float, ...]
@@ -127,7 +130,10 @@ class Gap:
 
 @dataclass(frozen=True)
 class Location:
-    """Joint and regime of motion in which a part of the gap lies, with its share."""
+    """Joint (from 1) and regime of motion in which a part of the gap lies, with its share of the gap.
+
+    `variable`, `low` and `high` are the regime's variable and its limits in SI units; None for a joint's whole motion.
+    """
 
     joint: int
     share: float
@@ -140,7 +146,7 @@ class Location:
 
 @dataclass(frozen=True)
 class Equivalent:
-    """An effect that the logs do not distinguish from a named one, and why; `joints` and `row` as in `Cause`."""
+    """An effect that the logs do not distinguish from a named cause, with the reason `why`; `joints` and `row` as in `Cause`."""
 
     effect: str
     joint: int | None
@@ -193,7 +199,7 @@ class Cause:
 
 @dataclass(frozen=True)
 class Bound:
-    """An upper bound on an effect's size."""
+    """Upper confidence limit `value`, at the confidence level `level`, of the parameter that gives the size of an effect that was not found."""
 
     parameter: str
     value: float
@@ -304,7 +310,7 @@ _Record = TypeVar("_Record", Value, Bound, Sanity)
 
 @dataclass(frozen=True)
 class Diagnosis(NotebookDisplay):
-    """The result of `diagnose`.
+    """Result of `diagnose`: size, location and causes of the gap between an arm's nominal model and its logs.
 
     Attributes
     ----------
@@ -312,7 +318,7 @@ class Diagnosis(NotebookDisplay):
         ``"none"``: the gap is within noise; ``"parameters"``: right structure, wrong values; ``"effect"``: causes
         named; ``"unexplained"``: a gap that no effect in the library explains; ``"input"``: logs and arm file contradict each other.
     gap : Gap
-        RMS prediction errors on the holdout, before and after.
+        RMS prediction errors on the holdout, before and after parameters are re-estimated and causes added.
     where : tuple of Location
         Joints and regimes where the gap lies, the largest share first.
     causes : tuple of Cause

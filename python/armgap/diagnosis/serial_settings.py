@@ -10,7 +10,7 @@ from armgap.check.check import Check
 __all__ = ["serial_settings"]
 
 _FILTERED_HALF_WIDTH_S = 0.4
-"""Half width of the test functions for a log with low-passed positions [s]: they pass half of 1.25 Hz, less than usual filters do."""
+"""Half width of the test functions for a log with low-passed positions [s]: their gain at 1.25 Hz is one half, less than that of usual filters."""
 _UNKNOWN_UNITS = (
     "torques have the unit that the arm file's masses give them: no load, wrong link or torque gain can be told"
 )

@@ -21,7 +21,7 @@ DIGITS, LEAST = 4, 1e-4
 
 @dataclass(frozen=True)
 class BaseParameters:
-    """Base parameters of a serial arm: independent parameters, each with the dependent ones that it combines with.
+    """Base parameters of a serial arm: independent parameters, each with the dependent parameters that it combines with.
 
     With independent columns `Y_b` of the regressor, `Y theta = Y_b (theta_b + K theta_d)`: motion determines only the sum in brackets,
     not its terms.

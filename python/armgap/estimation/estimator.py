@@ -1,4 +1,4 @@
-"""The online estimator of the embedded core, sample by sample or over arrays."""
+"""The online estimator of the embedded core, updated sample by sample or with arrays of samples."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from armgap.literals import FILTERS, SCHEMES, SERIAL, Filters, Scheme
 __all__ = ["OUTCOMES", "Estimator", "Run"]
 
 OUTCOMES: tuple[str, ...] = ("updated", "starting", "rejected")
-"""Outcomes of a sample given to the online estimator."""
+"""Outcomes of a sample given to the online estimator: estimate updated, too few samples yet for a regression, or sample rejected."""
 
 _FORMS = ("plain", "factorized")
 
@@ -55,15 +55,15 @@ class Estimator:
     scheme : {"filtered-power", "filtered-dynamic", "supplied-energy"}
         Regression model: equations (30), (24) and (28) of Reyes and Kelly (1997).
     filters : {"exact", "paper"}
-        Consistent filters, or those of the paper as printed.
+        Consistent filters, or those of Reyes and Kelly (1997) as printed.
     cutoff : float, default 50
         Cut-off of the filters [rad/s], in (0, 1e6].
     forgetting : float, default 1
         Forgetting factor in (0, 1]. Forgetting raises no variance above its initial value, so a resting arm does no harm.
     p0 : float, default 1000
-        ``P(0) = p0 I``, in (0, 1e12].
+        Initial covariance ``P(0) = p0 I``, in (0, 1e12].
     theta0 : array_like, shape (n_parameters,), optional
-        ``theta(0)``, zero by default.
+        Initial parameters ``theta(0)`` [SI], zero by default.
     asymmetry : bool, default False
         Estimate a constant resisting torque per joint too.
     fixed : iterable of str, optional
@@ -74,13 +74,13 @@ class Estimator:
     single : bool, default False
         Compute in single precision, as on a controller without a unit for doubles.
     memory : float, default 400
-        Samples over which errors and excitation are averaged, at least 1.
+        Number of samples over which prediction errors and excitation are averaged, at least 1.
     settling, learning : int, default 400 and 1600
-        Samples used before the alarm learns the size of the errors, and samples from which it learns (at least 2).
+        Number of samples before the alarm learns the size of the prediction errors, and number of samples from which it learns (at least 2).
     between : float, default 1e6
-        Mean number of samples between false alarms, at least 10, if errors stay Gaussian and as large as they were learned.
+        Mean number of samples between false alarms, at least 10, if prediction errors stay Gaussian and of the size that was learned.
     floor : float, default 0
-        Least standard deviation of an error that matters, in its unit (N m, W or J).
+        Lower limit of the standard deviation of prediction errors that the alarm assumes, in the unit of the errors (N m, W or J).
 
     Raises
     ------
@@ -199,7 +199,7 @@ class Estimator:
 
     @property
     def errors(self) -> NDArray[np.float64]:
-        """Prediction errors of the last used sample [N m, W or J], one per joint or a single one."""
+        """Prediction errors of the last used sample [N m, W or J by scheme], shape (n_joints,) or (1,)."""
         return self._native.errors
 
     @property
@@ -209,7 +209,7 @@ class Estimator:
 
     @property
     def alarm(self) -> float:
-        """Sum of the alarm's test of prediction errors as a share of its limit: above 1 the model no longer explains the arm."""
+        """Cumulative sum of the test of prediction errors (Page 1954), as a share of its limit: above 1 the model no longer explains the arm."""
         return self._native.signals[1]
 
     @property

@@ -18,7 +18,7 @@ __all__ = ["ArmFit", "fit"]
 
 @dataclass(frozen=True)
 class ArmFit:
-    """The result of `fit`.
+    """Result of `fit`: parameters of an arm, estimated from one log by output error.
 
     Attributes
     ----------
@@ -71,7 +71,7 @@ def fit(log: Log, arm: Arm, *, horizon: float = 0.25) -> ArmFit:
     log : Log
         Log to fit.
     arm : Arm
-        Arm; its parameters are the initial values.
+        Arm; its parameters are the initial values of the fit.
     horizon : float, default 0.25
         Length of a window [s]. Longer windows are more sensitive to the parameters and less to initial states.
 

@@ -29,7 +29,7 @@ DRIFT_SHARE = 0.02
 
 @dataclass(frozen=True)
 class Identification:
-    """The result of `identify`.
+    """Result of `identify`: parameters of an arm, estimated from one log by recursive least squares.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class Identification:
     theta : ndarray, shape (n_parameters,)
         Estimate after the last sample.
     sigma : ndarray, shape (n_parameters,)
-        Standard deviations, from the last covariance and the prediction errors of the second half of the log, as if these were white.
+        Standard deviations, from the last covariance and the prediction errors of the second half of the log, as if these errors were white.
     nominal : ndarray, shape (n_parameters,)
         The arm file's values of the parameters in `theta`; NaN for a parameter that it lacks.
     base : BaseParameters, optional
@@ -50,7 +50,7 @@ class Identification:
     t : ndarray, shape (n_samples,)
         Sample times [s].
     history : ndarray, shape (n_samples, n_parameters)
-        Estimates over time.
+        Estimate after each sample [SI].
     errors : ndarray, shape (n_samples, n_joints) or (n_samples, 1)
         Prediction errors; NaN before the first regression.
     cutoff_drift : ndarray, shape (n_parameters,), or None
@@ -185,15 +185,15 @@ def identify(
     scheme : {"filtered-power", "filtered-dynamic", "supplied-energy"}
         Regression model: equations (30), (24) and (28) of Reyes and Kelly (1997).
     filters : {"exact", "paper"}
-        Consistent filters, or the paper's as printed.
+        Consistent filters, or those of Reyes and Kelly (1997) as printed.
     cutoff : float, default 50
         Cut-off of the filters [rad/s].
     forgetting : float, default 1
         Forgetting factor in (0, 1].
     p0 : float, default 1000
-        ``P(0) = p0 I``.
+        Initial covariance ``P(0) = p0 I``.
     theta0 : array_like, shape (n_parameters,), optional
-        ``theta(0)``, zero by default.
+        Initial parameters ``theta(0)`` [SI], zero by default.
     asymmetry : bool, default False
         Estimate a constant resisting torque per joint too, which is what Coulomb friction of different levels adds in motion.
     fixed : iterable of str, optional

@@ -23,7 +23,7 @@ _PLAIN = {str: "string", bool: "boolean", int: "integer", float: "number", type(
 
 
 def schema_of(kind: Any, definitions: dict[str, Schema]) -> Schema:
-    """Return the schema of a type.
+    """Return the JSON Schema of a Python type.
 
     Parameters
     ----------

@@ -40,7 +40,7 @@ _PLACE = "choose another place"
 _STDOUT, _STDERR = 1, 2
 _OS_ERROR = re.compile(r"\(os error ([0-9]+)\)")
 """Pattern of an operating system's error number in error messages of libraries written in Rust."""
-_NEW_FILE = 0o666  # less the umask
+_NEW_FILE = 0o666  # permissions of a new file, less the umask
 
 
 def write(path: str | os.PathLike[str], content: Content) -> None:
@@ -127,8 +127,8 @@ def check_writable(path: str | os.PathLike[str]) -> None:
     try:
         os.stat(target)
     except (FileNotFoundError, NotADirectoryError, PermissionError):
-        pass  # said more plainly below
-    except (OSError, ValueError) as error:  # a name that is too long, links in a circle
+        pass  # the checks below give a clearer message
+    except (OSError, ValueError) as error:  # such as a name that is too long, or a loop of symbolic links
         raise _refused(path, error) from None
     if not os.path.isdir(target.parent):
         raise ResultError("its folder does not exist", remedy="make the folder first", file=path)
@@ -144,7 +144,7 @@ def descriptor(path: str | os.PathLike[str]) -> int | None:
     A file to which standard output or standard error is redirected counts as the stream: replacing the file would detach it from the shell.
     """
     word = os.path.abspath(path)
-    for _ in range(40):  # as many links as Linux follows
+    for _ in range(40):  # largest number of symbolic links that Linux follows
         parent, name = os.path.realpath(os.path.dirname(word)), os.path.basename(word)
         if parent in (f"/proc/{os.getpid()}/fd", "/dev/fd") and name.isdecimal():
             return int(name)
@@ -210,7 +210,7 @@ def _replace(target: Path, content: Content) -> None:
         _check_replaceable(target, old)
         mode = stat.S_IMODE(old.st_mode)
     if callable(content) and not is_text(target):
-        content = _bytes(content)  # libraries take names that are text only
+        content = _bytes(content)  # libraries accept only names that are valid text
     temporary = _beside(target)
     try:
         os.close(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode))
@@ -222,7 +222,7 @@ def _replace(target: Path, content: Content) -> None:
                 stream.flush()
             if old is not None:
                 _keep(stream.fileno(), target, old)
-            os.fsync(stream.fileno())  # a full disk or quota may show itself only now
+            os.fsync(stream.fileno())  # a full disk or quota may raise an error only here
         os.replace(temporary, target)
     finally:
         temporary.unlink(missing_ok=True)
@@ -267,11 +267,11 @@ def _keep(number: int, target: Path, old: os.stat_result) -> None:
     if hasattr(os, "fchown") and (new.st_uid, new.st_gid) != (old.st_uid, old.st_gid):
         os.fchown(number, old.st_uid, old.st_gid)
     if hasattr(os, "listxattr"):
-        with suppress(OSError):  # not every file system has them
+        with suppress(OSError):  # not every file system has extended attributes
             for name in os.listxattr(target):
                 os.setxattr(number, name, os.getxattr(target, name))
     if hasattr(os, "fchmod"):
-        os.fchmod(number, stat.S_IMODE(old.st_mode))  # after the owner, whose change clears bits of it
+        os.fchmod(number, stat.S_IMODE(old.st_mode))  # after fchown, which clears bits of the mode
 
 
 def _bytes(content: Content) -> bytes:
@@ -302,7 +302,7 @@ def _to_descriptor(number: int, content: Content) -> None:
 
 
 def _to_stdout(content: Content) -> None:
-    """Print a result to standard output; text ends with a line break."""
+    """Write a result to standard output, with a line break at the end of a text."""
     data = _bytes(content)
     if isinstance(content, str) and not content.endswith("\n"):
         data += b"\n"
@@ -310,5 +310,5 @@ def _to_stdout(content: Content) -> None:
     if hasattr(sys.stdout, "buffer"):
         sys.stdout.buffer.write(data)
     else:
-        sys.stdout.write(data.decode("utf-8", "backslashreplace"))  # a notebook's stream has text only
+        sys.stdout.write(data.decode("utf-8", "backslashreplace"))  # a notebook's stream accepts only text
     sys.stdout.flush()

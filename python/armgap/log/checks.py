@@ -26,7 +26,7 @@ _GAP_PERIODS = 3.0
 _PERIOD_MARGIN = 0.1
 # Deviation of sample times from an even grid, in periods, from which it is reported.
 _JITTER = 0.02
-# Times per finding that are kept for charts at most.
+# Largest number of times per finding that are kept for charts.
 _DRAWN = 200
 
 

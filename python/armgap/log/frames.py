@@ -83,6 +83,6 @@ def _mapping(frame: Mapping[str, Any], name: str) -> Recording:
     except Exception as error:
         raise OptionError(f"`{name}` holds something other than arrays ({error})", remedy=f"give {_KNOWN}") from None
     if all(array.ndim == 1 and len(array) == len(next(iter(held.values()))) for array in held.values()):
-        # One clock, and every type of column that tables know, such as words where numbers should be.
+        # Columns on one clock may have any type that a table supports; words in place of numbers are reported later.
         return Recording((Stream.of(pl.DataFrame({key: frame[key] for key in held})),))
     return arrays.record(held, name, "mapping")

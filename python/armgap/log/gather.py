@@ -53,7 +53,7 @@ def gather(
     logs : Log, path, pattern, table, or sequence of these
         Input to read; for tables see `Log.from_frame`.
     arm, columns, units
-        As in `Log.read`.
+        Arm of the logs, the files' own names of columns, and units that are not SI, as in `Log.read`.
 
     Raises
     ------

@@ -1,7 +1,7 @@
 """Reading of HDF5 and MATLAB files in a child process, safe from crashes of their libraries.
 
-The C libraries behind HDF5 and MATLAB files can crash on damaged ones (about 1 in 1500 to 3000 with a few bytes overwritten), or never
-come back. They run in a child process, which returns the data; if the child dies, an error of the file is raised and the program
+The C libraries behind HDF5 and MATLAB files can crash on damaged files (about 1 in 1500 to 3000 with a few bytes overwritten), or never
+return. They run in a child process, which returns the data; if the child dies, an error that names the file is raised and the program
 goes on. One child serves all files that are read, and ends with the program.
 """
 
@@ -112,9 +112,9 @@ def _receive(stream: Any) -> Any:
 
 
 def _serve() -> None:
-    """Answer requests from standard input until it ends, as the child process."""
+    """Answer requests on standard input until the stream ends; this is the main function of the child process."""
     answers = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # whatever a library prints must not come between answers
+    os.dup2(2, 1)  # text that a library prints must not mix with the answers
     requests = sys.stdin.buffer
     while True:
         try:
@@ -129,7 +129,7 @@ def _serve() -> None:
 
 
 def _portable(error: Exception) -> Exception:
-    """Return an exception that can be unpickled in any process."""
+    """Return a `ValueError` with the text of an exception, which can be unpickled in any process."""
     return ValueError(str(error) or type(error).__name__)
 
 

@@ -44,7 +44,7 @@ class Log:
     name : str
         Name of the log in results, usually that of the file.
     t : ndarray, shape (n_samples,)
-        Sample times [s], increasing, to the nanosecond; from 0, or from the begin of a part in its log.
+        Sample times [s], increasing, to the nanosecond; from 0, in a part of a log from the part's time in the whole log.
     q : ndarray, shape (n_samples, n_joints)
         Positions as measured [rad or m].
     tau : ndarray, shape (n_samples, n_joints)
@@ -58,18 +58,18 @@ class Log:
     columns : mapping
         The file's own name of each column in use, by standard name.
     moment : ndarray, shape (n_samples, n_joints), optional
-        First moment of every torque about the middle of its interval, if the torque is a mean of several [N m s^2 or N s^2].
+        First moment of every torque about the middle of its interval, if the torque is a mean over several samples [N m s^2 or N s^2].
     part_of : str, optional
         Name of the whole log, for a part of one.
     first_row : int
-        First row of the part in the whole log, from 0.
+        For a part of a log, index of its first row in the whole log, from 0.
     units : mapping
         Unit of each column in the file, by standard name; the arrays are in SI units.
     q_ref, dq_ref : ndarray, shape (n_samples, n_joints), optional
         Reference positions [rad or m] of a position controller, given at `t` and held until the next sample, of a log without torques,
         and reference velocities [rad/s or m/s] if logged.
     tau_meas : ndarray, shape (n_samples, n_joints), optional
-        Torques as measured at `t`, from the motors' currents as a rule, beside the commanded ones [N m or N].
+        Torques as measured at `t`, from the motors' currents as a rule, in addition to the commanded torques [N m or N].
     q_link : ndarray, shape (n_samples, n_joints), optional
         Positions from second encoders on the link's side of the transmissions [rad or m].
     """
@@ -142,7 +142,7 @@ class Log:
         name : str
             Name of the log in results and errors.
         columns, arm, units
-            As in `read`.
+            The table's own names of columns, arm of the log, and units that are not SI, as in `Log.read`.
 
         Raises
         ------
@@ -330,11 +330,11 @@ class Log:
         )
 
     def with_findings(self, findings: tuple[Finding, ...]) -> Log:
-        """Return the log with other findings in place of its own."""
+        """Return the log with `findings` in place of its own findings."""
         return replace(self, findings=findings)
 
     def to_native(self, tables: Sequence[NDArray[np.float64]] = ()) -> tuple[Any, ...]:
-        """Return the log as the tuple that the compiled core reads, with a table of torques per custom effect."""
+        """Return the log as the tuple that the compiled core reads, with the torque `tables`, shape (n_samples,) each, of custom effects."""
         fix = np.ascontiguousarray
         moment, dq_ref = (None if x is None else fix(x) for x in (self.moment, self.dq_ref))
         reference = None if self.q_ref is None or self.has_torques else (fix(self.q_ref), dq_ref)

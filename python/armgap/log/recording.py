@@ -39,7 +39,7 @@ class Source:
 
 @dataclass(frozen=True)
 class Stream:
-    """Columns of one length and one clock.
+    """Columns of a recording with one length and one clock.
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class Stream:
     fetch : callable
         Function that reads a column, by name, on demand.
     time : str, optional
-        Column with the times, if the format states it.
+        Name of the column with the times, if the format states it.
     units : mapping
         Units that the file states, by column, as in `armgap.log.conversion.units.FACTORS`.
     """
@@ -66,7 +66,7 @@ class Stream:
 
 @dataclass(frozen=True)
 class Suggestion:
-    """Mapping of columns that a file itself suggests, with findings to report."""
+    """Mapping from standard names to the columns that a file itself suggests for them, with findings to report."""
 
     names: Mapping[str, str]
     findings: tuple[Finding, ...] = ()

@@ -22,19 +22,19 @@ from armgap.log.log import Log
 __all__ = ["BUDGET", "STRETCH_S", "choose"]
 
 BUDGET = 24_000
-"""Samples of all training logs, or of all holdout logs, up to which logs are diagnosed whole; for longer logs stretches are chosen."""
+"""Largest number of samples of all training logs, or of all holdout logs, that are diagnosed whole; of longer logs stretches are chosen."""
 
 STRETCH_S = 2.0
 """Length of a stretch of a long log [s]."""
 
-_FEWEST = 4  # stretches, however long
+_FEWEST = 4  # number of stretches that a budget holds at least, whatever their length
 _POSITIONS = 12
-_SPEEDS = 6  # decades below the top speed, in halves
+_SPEEDS = 6  # classes of speed below the top speed, half a decade each
 _TORQUES = 8
 _TIMES = 8
-# Share of samples with motion of some joint that a stretch needs at least.
+# Smallest share of samples with motion of a joint in a stretch that is chosen.
 _MOTION = 0.02
-# Speed below which a joint is at rest: this part of the log's top speed, and fewer position steps than the second number.
+# Speed up to which a joint is at rest: this part of the top speed of the logs, or so many position steps per span if that is more.
 _REST_SHARE = 1e-3
 _REST_STEPS = 2.0
 
@@ -72,7 +72,7 @@ def choose(logs: Sequence[Log], budget: int = BUDGET, *, horizon: float = 0.25) 
     pieces = [piece for i, log in enumerate(logs) for piece in _cut(i, log, max(STRETCH_S, 4 * horizon), budget)]
     visits = _visits(logs, pieces)
     if not visits.any():
-        visits = np.ones_like(visits)  # nothing stands out from rest
+        visits = np.ones_like(visits)  # no stretch has motion: all count alike
     chosen = _greedy(visits, [last - first for _, first, last in pieces], budget)
     return [
         log
@@ -96,7 +96,7 @@ def _cut(index: int, log: Log, length_s: float, budget: int) -> list[tuple[int, 
 
 
 def _visits(logs: Sequence[Log], pieces: list[tuple[int, int, int]]) -> NDArray[np.float64]:
-    """Return the samples of each piece in each cell of coverage, shape (n_pieces, n_cells); zero for pieces at rest."""
+    """Return the weight of each stretch in each cell of coverage, shape (n_pieces, n_cells), as by `_cells`; zero for stretches at rest."""
     speeds = [_Speeds(log) for log in logs]
     ranges = _ranges(speeds)
     cells = np.array([_cells(logs[i], speeds[i], slice(first, last), ranges) for i, first, last in pieces])
@@ -123,7 +123,7 @@ class _Speeds:
 
 
 def _step(values: NDArray[np.float64]) -> float:
-    """Return the typical change between samples at rest: the lower quartile of non-zero changes."""
+    """Return the typical change of position between samples at rest: the 5 % quantile of the sizes of non-zero changes."""
     moved = np.abs(np.diff(values[: 1 << 20]))
     moved = moved[moved > 0]
     return float(np.quantile(moved, 0.05)) if len(moved) else 0.0
@@ -143,7 +143,7 @@ def _ranges(speeds: Sequence[_Speeds]) -> _Ranges:
 
 
 def _cells(log: Log, speeds: _Speeds, rows: slice, ranges: _Ranges) -> NDArray[np.float64]:
-    """Return the share of a piece's samples in each cell of coverage, for all joints."""
+    """Return the square root of the share of a stretch's samples in each cell of coverage, joint after joint; zeros for a stretch at rest."""
     dq, at = speeds.of(rows)
     rest = np.maximum(speeds.rest, _REST_SHARE * ranges.speed)
     moving = np.abs(dq) > rest
@@ -153,7 +153,7 @@ def _cells(log: Log, speeds: _Speeds, rows: slice, ranges: _Ranges) -> NDArray[n
 
 
 def _load(log: Log, rows: slice | NDArray[np.intp]) -> NDArray[np.float64]:
-    """Return absolute torques in some rows, shape (n, n_joints); with a position controller, absolute position errors."""
+    """Return the sizes of the torques in given rows, shape (n, n_joints); for a log of references, the sizes of ``q_ref - q``."""
     return np.abs(log.tau[rows] if log.q_ref is None or log.has_torques else log.q_ref[rows] - log.q[rows])
 
 
@@ -178,12 +178,12 @@ def _joint_cells(
         np.bincount(level[go], minlength=_TORQUES),
         np.bincount(level[turned], minlength=_TORQUES),
     ]
-    # A cell counts by the square root of the time in it: a little of everything beats much of one thing.
+    # Cells count by the square root of the share of time in them, so that short visits to many cells are worth more than long visits to few.
     return np.sqrt(np.concatenate(counts) / len(at))
 
 
 def _greedy(visits: NDArray[np.float64], rows: list[int], budget: int) -> list[int]:
-    """Return the chosen pieces in order: greedily those with the largest gain in summed logarithms of coverage, within the budget."""
+    """Return indices of the chosen stretches, sorted: greedily those with the largest gain in summed logarithms of coverage, within the budget."""
     covered = np.full(visits.shape[1], 0.1)
     left = set(np.flatnonzero(visits.any(axis=1)).tolist())
     chosen: list[int] = []
@@ -221,7 +221,7 @@ def _parts(whole: Log, spans: list[tuple[int, ...]]) -> list[Log]:
 
 
 def _merged(spans: list[tuple[int, ...]]) -> list[tuple[int, int]]:
-    """Return stretches with adjacent ones joined."""
+    """Return stretches ``(first, last)``, sorted, with adjacent stretches joined."""
     merged: list[tuple[int, int]] = []
     for first, last in sorted(spans):
         if merged and merged[-1][1] == first:

@@ -13,9 +13,9 @@ __all__ = ["next_steps"]
 
 Data = dict[str, Any]
 
-#: Unexcited effects listed in the next steps at most; a section of the report lists all.
+#: Largest number of unexcited effects that the next steps list; a section of the report lists all.
 LISTED = 3
-#: Remaining share of the gap above the floor from which a next step mentions it: a different motion alone changes it by less.
+#: Share of the gap above the floor that remains with the causes, from which a next step mentions it: another motion changes the share by less.
 REMAINDER = 0.2
 _EXPORT = "`armgap export DIAGNOSIS.json --arm ARM.toml -o corrected.toml` (`.xml` for MuJoCo, `.urdf` for URDF)"
 _INTO_MODEL = "; `--model ROBOT.urdf -o corrected.urdf` writes them into your own description"

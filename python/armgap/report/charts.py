@@ -1,6 +1,6 @@
-"""Charts of reports, in a common style with one meaning per colour, on a transparent ground for light and dark pages.
+"""Charts of reports in a common style: each colour has one meaning, and the background is transparent, for light and dark pages.
 
-Texts, axes and grids take their colour from the page's style sheet (``--bk-…`` variables), so they follow it into the dark.
+Texts, axes and grids take their colours from the page's style sheet (``--bk-…`` variables), so that they are readable on dark pages too.
 """
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ def lines(
     curves : sequence of (label, values, colour)
         Values have shape (n,).
     breaks : sequence of int
-        Indices before which a line is lifted.
+        Indices of the values before which all curves are interrupted.
     levels : sequence of (label, value, colour)
         Horizontal lines.
     """
@@ -205,7 +205,7 @@ def law(entry: dict[str, Any]) -> Any:
 
 
 def dependence(entry: dict[str, Any]) -> Any:
-    """Return a chart of an unnamed law: its table with the 95 % interval of each value.
+    """Return a chart of residual torque that no named effect explains, over the variable that it depends on, with 95 % intervals.
 
     Parameters
     ----------

@@ -38,7 +38,7 @@ _LEADS = {
     "unchanged": "The gap between the arm and its model is about what it was.",
     "none": "There is no gap, neither before nor after.",
 }
-#: Statuses of causes in the order of the report: gone and new ones first.
+#: Statuses of causes in the order of the report: causes that are gone or new first.
 _ORDER = ("gone", "new", "renamed", "smaller", "larger", "unchanged", "undecided", "unseen")
 
 
@@ -51,7 +51,7 @@ def comparison_document(c: Comparison) -> Document:
 
 
 def lead(c: Comparison) -> str:
-    """Return a sentence with the causes that are gone, the new ones, and the change of the gap."""
+    """Return sentences on the causes that are gone, the causes that are new, and the change of the gap."""
     return " ".join([*_went_and_came(c), _LEADS[c.outcome]])
 
 
@@ -66,7 +66,7 @@ def _by_status(c: Comparison) -> list[CauseChange]:
 
 
 def answers(c: Comparison) -> list[SummaryAnswer]:
-    """Return three answers about a repair: causes gone, causes new, and change of the gap."""
+    """Return three answers about two diagnoses: status of each cause, change of the gap, and changed parameters of the arm."""
     return [
         SummaryAnswer("What became of the causes?", *_became(c)),
         SummaryAnswer("Did the gap shrink?", *_shrunk(c)),

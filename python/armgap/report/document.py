@@ -1,4 +1,4 @@
-"""Contents of a report, independent of its form."""
+"""Contents of a report, independent of its form (HTML, Markdown, terminal)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = ["Document", "diagnosis_document"]
 
 @dataclass(frozen=True)
 class Document:
-    """Contents of a report, independent of its form.
+    """Contents of a report, independent of its form (HTML, Markdown, terminal).
 
     Attributes
     ----------

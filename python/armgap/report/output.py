@@ -42,7 +42,7 @@ FORMS: dict[str, Callable[[Document, dict[str, Any]], str]] = {
     ".md": _markdown,
     ".json": _json,
 }
-"""Functions that make a report's form, by file extension."""
+"""Functions that return a report as text (HTML, Markdown or JSON), by extension of the file's name."""
 
 
 def _form(path: str | Path) -> Callable[[Document, dict[str, Any]], str]:
@@ -81,7 +81,7 @@ def render_report(document: Document, data: dict[str, Any], path: str | Path) ->
     document : Document
         Contents of the report.
     data : dict
-        The result as a JSON object, for the machine form.
+        The result as a JSON object, for the JSON form.
     path : path-like
         Name of the file, whose extension decides; ``-`` is HTML.
 

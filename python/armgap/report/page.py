@@ -112,17 +112,17 @@ class Section:
     figures : sequence
         Charts: bokeh models, or `Drawing`.
     heats : sequence of HeatMap
-        Maps beside the charts.
+        Heat maps next to the charts.
     tables : sequence of Table or (header, rows)
         Tables.
     notes : sequence of str
         Paragraphs after the pictures.
     columns : int
-        Charts side by side where the page is wide.
+        Number of charts side by side on a wide page.
     sketch : str
-        A drawing of the program's own as an SVG element; never a string of the input.
+        Drawing made by armgap, as an SVG element; never a string of the input, because it is not escaped.
     points : sequence of str
-        A list, beside the drawing where there is one.
+        Entries of a list, shown next to the drawing if there is one.
     name : str
         Name of the section in links, such as ``"conventions"`` in ``#conventions``; by default its number.
     """
@@ -194,7 +194,7 @@ def _table(table: Table | tuple[Sequence[str], Sequence[Sequence[Cell]]]) -> Tab
 
 
 def _embedded(charts: Sequence[Any]) -> tuple[str, str, Sequence[str]]:
-    """Return charts as (script, library, elements); without charts, empty script and library."""
+    """Return charts as JavaScript of the charts, bokeh's library, and HTML element of each chart; empty strings without charts."""
     if not charts:
         return "", "", ()
     from bokeh.document import Document
@@ -206,7 +206,7 @@ def _embedded(charts: Sequence[Any]) -> tuple[str, str, Sequence[str]]:
             """Skip bokeh's validation of a chart, an eighth of the report's time; tests validate instead."""
 
     page = Checked()
-    with page.models.freeze():  # what belongs to the page is looked up once, not once per chart
+    with page.models.freeze():  # bokeh collects the models of the page once, not once per chart
         for chart in charts:
             page.add_root(chart)
     script, divs = components(tuple(charts))
@@ -227,7 +227,7 @@ def _template() -> Any:
 
 
 def _code(text: str) -> Any:
-    """Return an escaped text with its words between backticks set as code."""
+    """Return a text as escaped HTML, with its words between backticks as code elements."""
     from markupsafe import Markup, escape
 
     parts = text.split("`")

@@ -1,7 +1,7 @@
 """Sketch of an arm's conventions as SVG: zero, positive direction, elbow angle, sign of the torque, gravity.
 
-Lines and texts take their colour from the page (``currentColor`` and the variables ``--ink`` and ``--soft``), so that one drawing serves a
-light and a dark page; as a file of its own it brings both along. Angles count from hanging down, counter-clockwise.
+Lines and texts take their colour from the page (``currentColor`` and the variables ``--ink`` and ``--soft``), so that one drawing is readable
+on light and dark pages; the file of `sheet` contains the colours of both. Angles count from hanging down, counter-clockwise.
 """
 
 from __future__ import annotations
@@ -128,11 +128,11 @@ def _two_link() -> str:
 
 
 KINDS: dict[str, Callable[[], str]] = {"axis": _axis, "pendulum": _pendulum, "two-link": _two_link}
-"""Functions that draw the sketch, by kind of arm."""
+"""Functions that return the content of an arm's sketch as SVG, by kind of arm."""
 
 
 def _away(start: Point, angle: float, distance: float) -> Point:
-    """Return the point at a distance from `start` in a direction counted from down, counter-clockwise."""
+    """Return the point at a distance [px] from `start`, in a direction given by its angle [rad] from down, counter-clockwise."""
     return start[0] + distance * sin(angle), start[1] + distance * cos(angle)
 
 

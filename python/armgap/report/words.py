@@ -40,13 +40,13 @@ if not TYPE_CHECKING:
 
 Data = dict[str, Any]
 
-#: Causes less probable than this are called the best candidate, not the cause.
+#: Probability of the first cause below which the named causes are called the best candidates.
 DOUBTFUL = 0.5
-#: Share of the gap from which a joint is named in a sentence.
+#: Share of the gap from which a joint other than the first is named in a sentence.
 MINOR_JOINT = 0.02
 #: Shares beyond which percentages are written with one and with two decimals.
 NEARLY, ALMOST = 0.99, 0.995
-#: Joints whose errors a sentence gives at most; tables and charts have all.
+#: Largest number of joints whose errors a sentence gives; tables and charts have all joints.
 MOST_JOINTS = 3
 #: Decimal places, and size, beyond which a number is written with an exponent.
 MOST_PLACES, MOST = 6, 1e5
@@ -95,7 +95,7 @@ _INERTIAL = {
         "theta5": "gravity torque of link 2",
     },
 }
-#: Words for parameters of a serial arm that are no effects of the library.
+#: Titles of causes on serial arms that are no effects of the library, by name of the cause.
 _OF_SERIAL_ARMS = {
     "nominal_link": "wrong nominal link",
     "coupled_transmission": "transmission that couples two joints",
@@ -140,7 +140,7 @@ def _titles() -> dict[str, str]:
 
 
 def title(effect: str) -> str:
-    """Return the title of an effect for readers."""
+    """Return the title of an effect in words, by its name."""
     return _OF_SERIAL_ARMS.get(effect) or _titles().get(effect, effect.replace("_", " "))
 
 
@@ -165,7 +165,7 @@ def unit_text(unit: str) -> str:
 
 
 def value(entry: Any, digits: int = 4) -> str:
-    """Return a value with its uncertainty and unit, both rounded to one digit position; or a bare number."""
+    """Return a value with its standard deviation, both rounded to the same decimal place, and unit; or a bare number."""
     if not isinstance(entry, dict):
         return "" if entry is None else figure(float(entry), digits)
     if isinstance(entry["value"], list):
@@ -213,7 +213,7 @@ def milli_unit(units: Sequence[str]) -> str:
 
 
 def millis(values: Sequence[float], units: Sequence[str]) -> str:
-    """Return RMS errors per joint as text in thousandths of the unit, or in whole units for large errors, with one common unit or each with its own.
+    """Return RMS errors per joint as text in thousandths of the unit, or in whole units for large errors, with a unit each if the units differ.
 
     Examples
     --------
@@ -253,7 +253,7 @@ def each_joint(*models: Sequence[float], units: Sequence[str], joints: Sequence[
 
 
 def parameter_text(kind: str, name: str) -> str:
-    """Return the meaning of an arm's parameter in a few words; empty for an unknown one."""
+    """Return the meaning of an arm's parameter in a few words; empty for an unknown parameter."""
     stem, number = name.rstrip("0123456789"), name[len(name.rstrip("0123456789")) :]
     if stem in _FRICTION:
         return f"{_FRICTION[stem]} of joint {number}"
@@ -272,7 +272,7 @@ def named(effect: Data) -> str:
 
 
 def doubtful(data: Data) -> bool:
-    """Whether a diagnosis names causes although a part of the gap stays unexplained."""
+    """Whether the first cause that a diagnosis names has a probability below `DOUBTFUL`."""
     causes = data.get("causes") or []
     return bool(causes) and causes[0]["probability"] < DOUBTFUL
 
@@ -294,7 +294,7 @@ def verdict(data: Data) -> str:
 
 
 def _contradiction(data: Data) -> str:
-    """Return a sentence on the columns and arm file lines that contradict each other, and the remedy."""
+    """Return a sentence that names the checks that found contradictions, such as "torque sign of joint 1", with their remedies."""
     found = _errors(data)
     if not found:
         return _VERDICTS["input"]
@@ -369,7 +369,7 @@ def _inside(place: Data) -> str:
 
 
 def _limits(data: Data, place: Data) -> str:
-    """Return the range of a location's regime beside the joint's whole range: ``0.02 to 0.53 of at most 4.1 rad/s``."""
+    """Return the range of a location's regime with the joint's whole range: ``0.02 to 0.53 of at most 4.1 rad/s``."""
     span = place.get("range")
     if not span or span["variable"].startswith("reversal"):
         return ""

@@ -1,4 +1,4 @@
-"""MJCF models as MuJoCo's own compiler resolves them: defaults, includes, meshes, inertias from shapes."""
+"""Reading of MJCF models through MuJoCo's own compiler, which resolves defaults, includes, meshes, and inertias from shapes."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ class _Mjcf:
             return joint
         axis = unit_axis(m.jnt_axis[j])
         dof, reference = int(m.jnt_dofadr[j]), float(m.qpos0[m.jnt_qposadr[j]])
-        if axis is not None and reference != 0:  # the model is drawn at `ref`, not at 0
+        if axis is not None and reference != 0:  # MJCF gives frames at joint position `ref`, not at 0
             if kind == "prismatic":
                 translation = translation - reference * (rotation @ axis)
             else:
@@ -155,7 +155,7 @@ class _Mjcf:
                 continue
             follower, leader = int(m.eq_obj1id[e]), int(m.eq_obj2id[e])
             offset, multiplier = (float(x) for x in m.eq_data[e][:2])
-            # The constraint is between displacements from the pose that the model is drawn in.
+            # The constraint couples the joints' displacements from their reference positions (`ref` in MJCF).
             at = float(m.qpos0[m.jnt_qposadr[follower]])
             if leader < 0:
                 mimic = Mimic("", 0.0, at + offset)

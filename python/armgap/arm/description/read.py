@@ -30,7 +30,7 @@ def read_description(
     path : Path
         File.
     base, tip, frozen
-        As in `armgap.arm.description.resolve.resolve`.
+        First and last link of the chain (None for the default), and positions of joints that stand still [rad or m], as for `resolve`.
     expected : {"URDF", "MJCF"}, optional
         Format that the caller states.
 
@@ -45,7 +45,7 @@ def read_description(
 
 
 def read_tree(path: Path, expected: str | None = None) -> Tree:
-    """Read a URDF or MJCF file as a tree of links and joints; parameters and errors as for `read_description`."""
+    """Read a URDF or MJCF file as a tree of links and joints; `expected`, if given, is the format that the caller states."""
     data = read_text(path)
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         first = parse(data, path).tag

@@ -1,4 +1,4 @@
-"""Serial chain out of a tree of links: base to tip, with all links that do not move fused into the links that carry them."""
+"""Resolution of a tree of links to a serial chain from base to tip; links behind joints that stand still are fused into the links before them."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ __all__ = ["Carried", "Located", "locate", "resolve"]
 
 Array = NDArray[np.float64]
 
-#: Joints or links that an error message lists at most.
+#: Largest number of joints or links that an error message lists.
 _LISTED = 12
 # Largest distance between placements that count as equal [m]: what rounding of a description's numbers leaves.
 _SAME_PLACE = 1e-6
 _MOST_FOLLOWED = 16
-# Values of joint damping and friction in descriptions that are placeholders: some tools write them to calm a simulation down.
+# Values of joint damping and friction in descriptions that are placeholders: some tools write these values to stabilise a simulation.
 _PLACEHOLDERS = (10.0, 100.0, 1000.0)
 
 
@@ -47,7 +47,7 @@ class Carried:
     Attributes
     ----------
     link : str
-        Name.
+        Name of the carried link.
     rotation : ndarray, shape (3, 3)
         Axes of the carried link in the frame of the chain's link, as columns.
     translation : ndarray, shape (3,)
@@ -71,9 +71,9 @@ class Located:
     base : str
         The link in whose frame the chain begins.
     rotation : ndarray, shape (3, 3)
-        Axes of the base's frame in the frame of the root, as columns.
+        Axes of the base's frame in the frame of the root link, as columns.
     translation : ndarray, shape (3,)
-        Origin of the base in the frame of the root [m].
+        Origin of the base's frame in the frame of the root link [m].
     before, behind : ndarray, shapes (3, 3) and (3,)
         Axes, as columns, and origin [m] of the link before the first joint in the frame of the base.
     carried : tuple of tuple of Carried
@@ -310,7 +310,7 @@ class _Resolver:
         return sum((moved(self.tree.links[b.link], b.rotation, b.translation) for b in bodies), np.zeros(10))
 
     def _carried(self, link: str, pose: _Pose, onward: Joint | None, *, rigid: bool = True) -> list[Carried]:
-        """Return a link and all links that hang on it, except those behind the chain's joint `onward`."""
+        """Return a link and all links that hang on it, with their placements, except those behind the chain's joint `onward`."""
         found: list[Carried] = []
         ahead = [(link, pose, rigid)]
         while ahead:
@@ -470,7 +470,7 @@ def _values(joints: list[Joint], name: str) -> Array:
 
 
 def _gear_ratio(moving: list[Joint], notes: list[str]) -> Array | None:
-    """Return the joints' gear ratios; None unless all joints have one and not all are 1, which stands for unknown."""
+    """Return the joints' gear ratios, shape (n,); None if a joint has no gear ratio, or if all are 1, which stands for unknown."""
     ratios = _values(moving, "reduction")
     if np.isnan(ratios).all() or np.all(ratios[np.isfinite(ratios)] == 1.0):
         return None
@@ -482,7 +482,7 @@ def _gear_ratio(moving: list[Joint], notes: list[str]) -> Array | None:
 
 
 def _controller(moving: list[Joint], notes: list[str]) -> Controller | None:
-    """Return the position controller made of the joints' actuators; None unless all joints have one."""
+    """Return the position controller with the gains of the joints' actuators; None unless all joints have a position actuator."""
     kp, kd = _values(moving, "kp"), _values(moving, "kd")
     if not np.isfinite(kp).all():
         return None

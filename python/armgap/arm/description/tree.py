@@ -22,7 +22,7 @@ MOVING = ("revolute", "prismatic")
 
 @dataclass(frozen=True)
 class Mimic:
-    """Coupling of a joint to another one: its position is ``multiplier`` times the position of `joint`, plus `offset`."""
+    """Coupling of a joint to another joint: its position is ``multiplier`` times the position of `joint`, plus `offset` [rad or m]."""
 
     joint: str
     multiplier: float = 1.0
@@ -44,7 +44,7 @@ class Joint:
     translation : ndarray, shape (3,)
         Origin of the joint's frame in the frame of the parent link [m].
     axis : ndarray, shape (3,), optional
-        Unit vector in the joint's frame; None if the description's is zero.
+        Unit vector along the joint's axis, in the joint's frame; None if the description gives a zero axis.
     lower, upper, speed, effort : float
         Limits of position [rad or m], speed [rad/s or m/s] and torque [N m or N]; infinite where unknown.
     viscous, coulomb, rotor_inertia : float
@@ -115,9 +115,9 @@ class Tree:
     gravity: Array
     notes: tuple[str, ...] = ()
     parent_joint: dict[str, Joint] = field(init=False, default_factory=dict)
-    """Joint that moves each link, by name of the link; root links have none."""
+    """Joint that moves each link, by name of the link; root links have no entry."""
     child_joints: dict[str, list[Joint]] = field(init=False, default_factory=dict)
-    """Joints whose parent is a link, by name of the link."""
+    """Joints that each link is the parent of, by name of the link."""
 
     def __post_init__(self) -> None:
         """Check that the links of all joints exist, and index joints by parent and child link."""

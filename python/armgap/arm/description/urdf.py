@@ -1,4 +1,4 @@
-"""URDF: links with inertia and joints with axis, limits and friction; shapes, colours and simulators' own elements are ignored."""
+"""Reading of URDF: links with inertia, joints with axis, limits and friction; shapes, colours and simulators' own elements are ignored."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class _Urdf:
                 self._fail(element, "is there twice", "give each link a name of its own")
             links[name] = self._inertial(element)
         joints: dict[str, Joint] = {}
-        # A joint has a type; elements of the same name inside transmissions and sensors are not at this level.
+        # Only children of the root element are joints of the robot; transmissions and sensors have elements of the same name inside.
         for element in self.root.all("joint"):
             joint = self._joint(element)
             if joint.name in joints:
@@ -178,11 +178,11 @@ class _Urdf:
         return Mimic(other, self._number(mimic, "multiplier", 1.0), self._number(mimic, "offset", 0.0))
 
     def _reductions(self) -> Iterator[tuple[str, float]]:
-        """Yield joints with the gear ratios of their transmissions, given beside the joint, in the joint or in the actuator."""
+        """Yield names of joints with their gear ratios, given in the element of a transmission, of its joint or of its actuator."""
         for transmission in self.root.all("transmission"):
             joints, actuators = (list(transmission.all(tag)) for tag in ("joint", "actuator"))
             if len(joints) != 1:
-                continue  # a differential has no reduction of one joint
+                continue  # a differential transmission has no gear ratio of a single joint
             for holder in (transmission, *joints, *actuators):
                 element = holder.first("mechanicalReduction")
                 if element is None:

@@ -13,7 +13,7 @@ from armgap.files.reading import read_bounded
 __all__ = ["Element", "parse", "read_text"]
 
 _MOST_BYTES = 64 * 2**20
-"""Largest accepted size of a description, bytes: tens of times that of descriptions with collision shapes inside."""
+"""Largest accepted size of a description's file, bytes: tens of times the size of descriptions that contain collision shapes."""
 
 
 @dataclass
@@ -29,11 +29,11 @@ class Element:
     ends: int = 0
 
     def first(self, tag: str) -> Element | None:
-        """Return the first child element with a name; None without one."""
+        """Return the first child element with the name `tag`; None if there is none."""
         return next(self.all(tag), None)
 
     def all(self, tag: str) -> Iterator[Element]:
-        """Return all child elements with a name."""
+        """Return all child elements with the name `tag`."""
         return (child for child in self.children if child.tag == tag)
 
 
@@ -90,6 +90,6 @@ def parse(data: bytes, path: Path) -> Element:
     except expat.ExpatError as error:
         problem = f"is not valid XML: {expat.ErrorString(error.code)}"
         raise ModelFileError(problem, remedy="correct that line", file=path, row=error.lineno) from None
-    except (LookupError, ValueError) as error:  # an encoding that nobody knows
+    except (LookupError, ValueError) as error:  # an unknown encoding
         raise ModelFileError(f"cannot be read as text ({error})", remedy="store it as UTF-8", file=path) from None
     return top.children[0]

@@ -44,13 +44,13 @@ _PLANAR = {
     "links": "write [[link]] tables, or name a description with urdf or mjcf",
     "geometry": "leave it out: lengths are in the chain",
 }
-_HEAVIEST_PAYLOAD = 1e4  # kg
-_FURTHEST_COM = 10.0  # m
+_HEAVIEST_PAYLOAD = 1e4  # largest accepted mass of a payload, kg
+_FURTHEST_COM = 10.0  # largest accepted coordinate of a payload's centre of mass, m
 _TAU_KINDS = ("command", "measured")
 
 
 class SerialArmFile(ArmFile):
-    """One arm file of a serial arm while it is checked.
+    """Content of one arm file of a serial arm, with the checks of its keys and values.
 
     Parameters
     ----------
@@ -208,7 +208,10 @@ class SerialArmFile(ArmFile):
         return super()._vector(table, key, n, minimum, above)
 
     def _nominal(self, key: str, described: Array, free: Array, share: float) -> tuple[Array, Array]:
-        """Return nominal values and standard deviations of a parameter: from the arm file, else from the description, else 0 and `free`."""
+        """Return a parameter's nominal value per joint, from the arm file, else from the description, else 0, and its standard deviation.
+
+        The standard deviation is that of the arm file, else `share` of the value, or `free` for a value of 0.
+        """
         table, name = key.split(".")
         given = self._table_or_empty(table)
         n = len(self.joints)
@@ -218,7 +221,7 @@ class SerialArmFile(ArmFile):
         return values, np.where(values > 0, share * values, free)
 
     def _either(self, key: str, other: str, n: int) -> Array | None:
-        """Return a list of numbers that the arm file may hold in the table of limits or in another table, under the key `key` or `other`."""
+        """Return one number per joint from the key `key` or `other` of the arm file, of which at most one may be given; None without either."""
         first, second = self._optional(key, n), self._optional(other, n)
         if first is not None and second is not None:
             raise self.error(other, f"stands beside `{key}`", "give one of them")

@@ -27,9 +27,9 @@ _KEYS = (
 )  # fmt: skip
 _PLACEMENT = ("xyz", "rpy", "rotation")
 _KINDS: dict[str, JointKind] = {**{kind: kind for kind in get_args(JointKind)}, "continuous": "revolute"}
-#: Number of ``[[link]]`` tables in an arm file at most.
+#: Largest number of ``[[link]]`` tables in an arm file.
 _MOST_JOINTS = 64
-# Largest deviation of a rotation matrix in an arm file from an orthonormal one; a smaller one, from few digits, is orthonormalised.
+# Largest deviation of a rotation matrix in an arm file from an orthonormal matrix; a matrix within it, from few digits, is orthonormalised.
 _ROTATION = 1e-3
 _EXACT = 1e-12
 

@@ -19,7 +19,8 @@ __all__ = ["serial_toml"]
 
 Array = NDArray[np.float64]
 
-# Largest rounding error of the ten inertial parameters, relative to the largest, at which mass, centre and central inertia are written for them.
+# Largest rounding error of a link's ten inertial parameters, relative to the largest of them, at which mass, centre of mass and inertia about
+# the centre of mass are written in their place.
 _SAME = 1e-15
 _PER_JOINT = (
     ("position_min", "lower"),
@@ -92,7 +93,7 @@ def _inertial_lines(ten: Array) -> list[str]:
 
 
 def _neat(values: float | Array) -> Array:
-    """Return values rounded to 15 digits of the largest."""
+    """Return values rounded to 15 significant digits of the largest of them."""
     largest = float(np.max(np.abs(values)))
     digits = 15 - (math.ceil(math.log10(largest)) if largest > 0 else 0)
     return np.asarray(np.round(values, digits)) + 0.0

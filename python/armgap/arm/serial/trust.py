@@ -1,17 +1,17 @@
 """Default standard deviations of a serial arm's nominal parameters, where the arm file states none value by value.
 
 Links
-    One word for all of them, `Trust`. Its share t of the mass m is the mass's standard deviation. First moments have ``t m L`` and inertias
-    ``t m L^2``, with L the largest of the distance to the next joint, the distance to the centre of mass, and the radius of gyration, at least
-    5 % of the arm's reach (0.1 m for an arm without reach): a centre of mass on an axis, or an inertia of zero, is then no better known
+    One level of trust for all links, `Trust`, with a share t: the standard deviation of a link's mass m is ``t m``, of its first moments
+    ``t m L``, of its inertias ``t m L^2``. L is the largest of the distance to the next joint, the distance to the centre of mass, and the radius of
+    gyration, at least 5 % of the arm's reach (0.1 m for an arm without reach): a centre of mass on an axis, or an inertia of zero, is no better known
     than the rest of the link. ``"none"`` stands for values that are unknown: the standard deviation of the mass is what 100 kg per metre of L
     make, an order of magnitude above usual links (UR10: 15 to 25 kg/m, Panda: 10), and at least the mass itself.
 Friction
-    Half of each nominal coefficient. Without a value, a fifth of the largest expected torque of the joint: its limit of torque, or the
-    largest gravity torque by the arm itself, but at least 2 % of that of any joint; viscous friction reaches it at 1 rad/s
-    (0.2 m/s).
+    Half of each nominal coefficient. Without a nominal value, the standard deviation of Coulomb friction is a fifth of the largest expected torque of
+    the joint: its limit of torque, or the largest gravity torque by the arm itself, but at least 2 % of that of any joint. That of viscous friction
+    gives the same torque at 1 rad/s (0.2 m/s).
 Rotors
-    The nominal rotor inertia itself. Without a value, the inertia that the joint moves with the arm stretched out, but at least 2 % of that
+    The nominal rotor inertia itself. Without a nominal value, the inertia that the joint moves with the arm stretched out, but at least 2 % of that
     of any joint: the last joints of geared arms carry little and have rotors of the same size.
 """
 
@@ -34,7 +34,7 @@ TRUSTS: dict[Trust, float] = {"published": 0.1, "cad": 0.3, "guess": 1.0, "none"
 """Standard deviation of a link's mass as a share of the mass, by level of trust in the arm's inertial parameters."""
 #: Standard deviation of a friction coefficient that an arm file states, as a part of the coefficient.
 FRICTION_SHARE = 0.5
-#: Mass per length of a link of unknown mass, as its standard deviation [kg/m]: more than any robot's.
+#: Standard deviation of the mass of a link of unknown mass, per length of the link [kg/m]: more than the mass per length of any robot.
 _UNKNOWN_KG_PER_M = 100.0
 _USUAL_KG_PER_M = 10.0
 """Mass per length of a link without a mass in the description [kg/m], for scales of torque and inertia."""
@@ -45,8 +45,9 @@ _NO_REACH_M = 0.1
 _FRICTION_OF_TORQUE = 0.2
 #: Smallest scale of torque or inertia of a joint, as a part of the largest over the arm's joints.
 _LEAST_OF_LARGEST = 0.02
-_GRAVITY = 9.81  # m/s^2; of the scale of torque, whatever the arm's own
-_TURNING_SPEED, _SLIDING_SPEED = 1.0, 0.2  # rad/s, m/s
+_GRAVITY = 9.81  # m/s^2; for scales of torque, whatever the gravity of the arm
+# Speeds of rotary [rad/s] and linear joints [m/s] at which the standard deviations of unknown viscous and Coulomb friction torques are equal.
+_TURNING_SPEED, _SLIDING_SPEED = 1.0, 0.2
 
 
 class Scales:

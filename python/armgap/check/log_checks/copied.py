@@ -17,11 +17,11 @@ from armgap.log.log import Log
 
 __all__ = ["copied_holdout"]
 
-# Equal rows at one distance in time that make a copy; two runs of one experiment do not agree to the last digit so often.
+# Number of equal rows at one distance in time from which rows count as copied; two runs of one experiment agree to the last digit less often.
 _FEWEST = 40
 # Distances in time that differ by less than this part of a sample period count as one.
 _APART = 0.5
-# Largest hole in a copied range of rows that is filled: rows that occur twice are not compared.
+# Largest hole [rows] in a copied range of rows that is filled: rows that occur twice in a log are not compared.
 _HOLE = 50
 
 
@@ -59,7 +59,7 @@ def _rows(log: Log) -> tuple[NDArray[np.uint64], NDArray[np.intp]]:
     keys = np.zeros(len(log), dtype=np.uint64)
     driven = log.tau if log.q_ref is None else log.q_ref
     for column in (*log.q.T, *driven.T):
-        # Multiply and shift (a mixing step of SplitMix64): equal rows give equal numbers, others hardly ever.
+        # Multiply and shift (a mixing step of SplitMix64): equal rows give equal numbers, unequal rows hardly ever do.
         keys ^= (np.ascontiguousarray(column) + 0.0).view(np.uint64)
         keys *= np.uint64(0xBF58476D1CE4E5B9)
         keys ^= keys >> np.uint64(31)
@@ -88,7 +88,7 @@ def _common(
 
 
 def _filled(rows: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return row indices with small holes between them filled."""
+    """Return sorted row indices with the holes of up to `_HOLE` rows between them filled."""
     ends = np.flatnonzero(np.diff(rows) > _HOLE)
     parts = zip(rows[np.r_[0, ends + 1]], rows[np.r_[ends, len(rows) - 1]], strict=True)
     return np.concatenate([np.arange(a, b + 1) for a, b in parts])

@@ -41,11 +41,11 @@ _MOVES = 0.05
 _HELD = 0.1
 # Rows in motion that the check of filtered positions needs, and reversals that an exact log has to pass smoothly.
 _FEWEST, _REVERSALS = 200, 4
-# Positions are exact if noise is within so many roundings, fourth differences if they are within so many times more.
+# Largest noise of positions that count as exact, in rounding errors, and factor on that noise for fourth differences that count as zero.
 _EXACT, _FOURTH = 20.0, 8.0
 # Deviation from a sample period, as a part of it, within which rows count as evenly spaced, so that differences are meaningful.
 _EVEN = 0.2
-# Share of fourth differences that are zero between an interpolation's knots, ratio of the others to the rounding, and steps of a
+# Share of fourth differences that are zero between an interpolation's knots, ratio of the other differences to the rounding, and steps of a
 # grid of positions that rounding to the grid makes more often than zero.
 _PIECEWISE, _KNOTS, _FEW_COUNTS = 0.05, 1e3, 5
 # Fourth differences at an interpolation's knots are of any size: their 90 % quantile is so many times their 5 % quantile, for at least so many
@@ -64,7 +64,7 @@ def look(log: Log, arm: Arm | None) -> Outcome:
     found = []
     for j in range(log.n_joints):
         step = None if steps is None else float(steps[j])
-        # A description says little of friction: a serial arm's joints are taken to have some.
+        # Robots' descriptions seldom state friction: the joints of a serial arm are taken to have dry friction.
         dry = arm is None or arm.chain is not None or float(arm.theta[len(arm.theta) - arm.n_joints + j]) > 0
         why = _why(log, j, step, dry)
         if why:
@@ -74,7 +74,7 @@ def look(log: Log, arm: Arm | None) -> Outcome:
 
 
 def _why(log: Log, j: int, step: float | None, dry: bool) -> str:
-    """Return why joint j's positions do not come from a raw encoder; empty if nothing speaks against one."""
+    """Return why joint j's positions cannot come from a raw encoder; empty if no reason was found."""
     rows = blocks(len(log))
     pieces = [np.ascontiguousarray(log.q[r, j]) for r in rows]
     paces = [travel_per_row(q, _HALF) for q in pieces]
@@ -115,7 +115,7 @@ def _why(log: Log, j: int, step: float | None, dry: bool) -> str:
 
 
 def _even(t: Array, period: float) -> NDArray[np.bool_]:
-    """Return a mask of the rows whose neighbours, on either side, lie a sample period away."""
+    """Return a mask of the rows from which the steps in time, over six rows to either side, are equal to the sample period `period` [s]."""
     off = np.append(0, np.cumsum(np.abs(np.diff(t) / period - 1) > _EVEN))
     rows = np.arange(len(t))
     return np.asarray(off[np.minimum(rows + _HALF, len(t) - 1)] == off[np.maximum(rows - _HALF, 0)])
@@ -138,7 +138,7 @@ def _largest(pieces: list[Array]) -> float:
 
 
 def _between_knots(pieces: list[Array], moving: list[NDArray[np.bool_]], exact: float, grid: float) -> float:
-    """Return the share of rows with fourth differences of exactly zero; 0 if all differences are alike, or are steps of a grid."""
+    """Return the share of rows with fourth differences of zero; 0 if the other differences are of one size, or are steps of a grid."""
     bends = np.concatenate([np.abs(np.diff(q, n=4)[m[2:-2]]) for q, m in zip(pieces, moving, strict=True)])
     zero = bends <= exact
     others = bends[~zero]
@@ -166,7 +166,7 @@ def _reversals(pieces: list[Array], moving: list[NDArray[np.bool_]]) -> int:
 
 
 def _driven(log: Log, j: int, rows: list[slice], moving: list[NDArray[np.bool_]]) -> bool:
-    """Whether torques explain joint j's high frequencies: held torques accelerate, so sixth differences of position follow fourth ones of torque."""
+    """Whether torques explain joint j's high frequencies: with held torques, sixth differences of position follow fourth differences of torque."""
     if not log.has_torques:
         return False
     y = np.concatenate([np.diff(log.q[r, j], n=6)[m[3:-3]] for r, m in zip(rows, moving, strict=True)])

@@ -11,12 +11,12 @@ __all__ = ["ORDERS", "blocks", "from_neighbours", "grid_step", "noise_by_order",
 
 Array = NDArray[np.float64]
 
-# Number and length of the blocks of rows, evenly spread over a log, that evidence is taken from: enough for a few per cent at bounded cost.
+# Number and length [rows] of the blocks, evenly spread over a log, that checks are computed from: accurate to a few per cent at bounded cost.
 _BLOCKS, _BLOCK_ROWS = 16, 4096
 
 # Values lie on a grid if at least this share (second number) of their differences lies so close (first number, in steps) to whole steps.
 _CLOSE, _MOST = 0.1, 0.97
-# Distinct values from which the step of a grid is determined.
+# Smallest number of distinct values from which the step of a grid is determined.
 _FEWEST_LEVELS = 6
 # Values closer to each other than this part of the largest count as one value.
 _SAME = 1e-12
@@ -26,7 +26,7 @@ ORDERS = (4, 6, 8, 10, 12)
 
 
 def blocks(n: int) -> list[slice]:
-    """Return slices of the rows that evidence is taken from: all n rows of a short log, evenly spread blocks of a long one."""
+    """Return slices of the rows that checks of a log are computed from: all n rows of a short log, evenly spread blocks of a long log."""
     if n <= _BLOCKS * _BLOCK_ROWS:
         return [slice(0, n)]
     starts = np.linspace(0, n - _BLOCK_ROWS, _BLOCKS).astype(int)
@@ -34,7 +34,7 @@ def blocks(n: int) -> list[slice]:
 
 
 def grid_step(values: Array) -> float | None:
-    """Return the step of the grid that values lie on; None for values without a grid, or too few distinct ones.
+    """Return the step of the grid that values lie on; None for values without a grid, or with too few distinct values.
 
     Examples
     --------

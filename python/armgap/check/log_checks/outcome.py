@@ -14,7 +14,7 @@ from armgap.log.log import Log
 
 __all__ = ["NOTHING", "Outcome", "ranges", "seconds", "with_rows"]
 
-# Ranges of rows that a check lists at most.
+# Largest number of row ranges that a check lists.
 _LISTED = 200
 
 
@@ -65,7 +65,7 @@ def seconds(time: float) -> str:
 
 
 def with_rows(log: Log, kept: NDArray[np.intp], valid: NDArray[np.bool_] | None = None) -> Log:
-    """Return some rows of a log, each with the mean torque, or reference, from its own time to that of the next kept row.
+    """Return the rows `kept` of a log, each with the mean torque, or reference, from its own time to that of the next kept row.
 
     The torque's impulse over every interval and its first moment are preserved, so that an arm gains the same momentum and travels the same
     distance.

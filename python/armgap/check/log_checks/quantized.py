@@ -1,4 +1,4 @@
-"""Coarsely quantised torques: many levels, all whole multiples of a step that is large beside the torque's own variation.
+"""Coarsely quantised torques: many levels, all whole multiples of a step that is large relative to the torque's own variation.
 
 A command with few levels by design, or that stays at each level for long and then jumps by more than one step, is not quantised.
 """
@@ -24,7 +24,8 @@ _MATTERS = 0.015
 _LEVELS = 8
 # Changes of a torque's level that the check of quantisation needs.
 _CHANGES = 40
-# A torque counts as rounded if its median stay at a level is below so many rows, or this share of its changes are of one step and stays vary so much.
+# A torque counts as rounded if its median stay at a level is below so many rows, or if more than this share of its changes are of one step and
+# the standard deviation of the stays exceeds this part of their mean.
 _STAYS, _ONE_STEP, _EQUALLY_LONG = 5, 0.5, 0.2
 
 

@@ -1,4 +1,4 @@
-"""Positions held over several rows while the joint moves: only rows with a fresh position stay.
+"""Positions held over several rows while the joint moves: the repair keeps only rows with a new position.
 
 A held position is followed by a step that makes up for the rows of the hold. A joint that stops shows no such step, and
 a joint that moves by a few encoder counts per row or less repeats its position by nature.
@@ -105,7 +105,7 @@ def _holds(q: Array, step: float) -> tuple[int, int, Array]:
     starts = np.append(0, np.flatnonzero(q[1:] != q[:-1]) + 1)
     if len(starts) < 4:
         return 0, 0, np.empty(0)
-    length = np.diff(starts).astype(np.float64)[1:-1]  # of holds that are whole and have a step on either side
+    length = np.diff(starts).astype(np.float64)[1:-1]  # lengths of the holds that have a step on either side
     steps = q[starts[1:]] - q[starts[:-1]]
     into, out = steps[:-2], steps[1:-1]
     first = starts[1:-2]
@@ -123,14 +123,14 @@ def _agree(held: _Held, other: _Held) -> bool:
     both = held.fast & other.fast
     if np.count_nonzero(both) < _FEWEST:
         return True
-    # The rarer of the two: a joint that stops now and then repeats its position by itself there.
+    # The smaller count of the two joints: a joint that stops at times repeats its position without being held.
     one, two = np.count_nonzero(held.again & both), np.count_nonzero(other.again & both)
     rarer = min(one, two) if other.share >= _SHARE else one
     return bool(np.count_nonzero(held.again & other.again & both) >= _AGREE * rarer)
 
 
 def _fresh(log: Log, held: list[_Held]) -> NDArray[np.intp]:
-    """Return the rows with fresh positions: every period of a regular hold, otherwise all rows in which no moving joint is held."""
+    """Return the rows with new positions: one row per period of a regular hold, otherwise all rows in which no moving joint is held."""
     rows = np.arange(len(log))
     beat = _beat(held)
     if beat is not None:
@@ -143,7 +143,7 @@ def _fresh(log: Log, held: list[_Held]) -> NDArray[np.intp]:
 
 
 def _beat(held: list[_Held]) -> tuple[int, int] | None:
-    """Return period and phase of a regular hold, rows; None for an irregular one."""
+    """Return period and phase [rows] at which new positions follow a regular hold; None for an irregular hold."""
     fresh = np.unique(np.concatenate([np.flatnonzero(~h.again & h.fast) for h in held]))
     if len(fresh) < _FEWEST:
         return None

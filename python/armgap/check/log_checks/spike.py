@@ -38,11 +38,11 @@ _TORQUE_FACTOR, _TORQUE_ABSURD = 30.0, 1e3
 _TORQUE_ACTIVE = 0.05
 # Rows that each part of a log needs for the log to be split in two.
 _FEWEST_LEFT = 16
-# Rows over which a speed is taken on either side of a torque spike.
+# Number of rows over which the speed on either side of a torque spike is computed.
 _SPEED_ROWS = 5
 # Length left out around a torque spike [s; periods]: predictions end where samples are missing for 10 periods and a quarter of the usual horizon.
 _BREAK, _BREAK_PERIODS = 0.07, 12
-# Rows that scales of travel and torque are taken from at most.
+# Largest number of rows from which scales of travel and torque are computed.
 _ENOUGH = 200_000
 
 
@@ -94,7 +94,7 @@ def _positions(q: Array) -> Rows:
     floor = _TIMES_USUAL * float(np.quantile(thin, 0.95)) + 1e-9 * float(np.median(np.abs(q)))
     steps = np.abs(steps)
     wild: list[Rows] = [_at_start(q, floor), len(q) - 1 - _at_start(q[::-1], floor)]
-    # Into a spike the path bends by about its size: at row k - 1, which is bend k - 2.
+    # A spike that begins at row k makes a second difference of about its size at row k - 1, which is entry k - 2 of `bends`.
     first = np.flatnonzero(bends > floor / 4) + 2
     for m in range(1, _LONGEST + 1):
         k = first[(first >= 3) & (first < len(q) - m - 2)]
@@ -114,7 +114,7 @@ def _line(q: Array, k: Rows, m: int, i: int) -> Array:
 
 
 def _at_start(q: Array, floor: float) -> Rows:
-    """Return the first row, or the first few, if they lie far off the line through the rows after them."""
+    """Return the first one to three rows if they lie far off the straight line through the rows after them; else no row."""
     for m in range(_LONGEST, 0, -1):
         around = float(np.max(np.abs(np.diff(q[m : m + 4]))))
         pace = q[m + 1] - q[m]

@@ -28,7 +28,8 @@ _EVEN = 0.01
 # Even times are better if they leave less than the first part of the stamps' error variance on some joint, and on no joint more than the second
 # number times it, in the share of rows (third number) where jitter shows most.
 _BETTER, _WORSE, _LOUD = 0.5, 1.2, 0.2
-# Correlation of position errors with the stamps' scatter, at most: 1 where stamps are right, 0 where even times are.
+# Largest regression coefficient of position errors over even times on the errors that right stamps would make: 1 where stamps are right, 0 where
+# even times are right.
 _SHOWN = 0.15
 # Rows that the comparison of stamps and even times needs.
 _FEWEST = 100
@@ -50,7 +51,7 @@ def look(log: Log, arm: Arm | None) -> Outcome:
         return NOTHING
     period = log.sample_period
     steps = np.diff(log.t)
-    # Whole periods, rows missing or not, are even.
+    # Steps by whole periods, where rows may be missing, count as even.
     if float(np.mean(np.abs(steps / period - np.maximum(np.round(steps / period), 1)))) < _EVEN:
         return NOTHING
     even = _even_times(log.t, steps, period)
@@ -70,7 +71,7 @@ def look(log: Log, arm: Arm | None) -> Outcome:
 
 
 def _better(log: Log, even: Array) -> float | None:
-    """Return the ratio of position errors over even times to those over the stamps; None unless even times are clearly better."""
+    """Return the ratio of position errors over the stamps to those over even times; None unless even times are clearly better."""
     rows = blocks(len(log))
     joined = [_misses(log.t[r], even[r], log.q[r]) for r in rows]
     stamped, evenly, shown = (np.concatenate(columns) for columns in zip(*joined, strict=True))
@@ -146,7 +147,7 @@ def _missing(t: Array, steps: Array, period: float) -> NDArray[np.intp]:
     clear = shift > _LATE
     at, shift = at[clear], shift[clear]
     first, last = np.searchsorted(at, at - _BESIDE + 1), np.searchsorted(at, at + _BESIDE)
-    # The same missing row shifts the means beside it too: the longest step among close ones has it.
+    # A missing row also shifts the means at nearby steps: it is assigned to the longest of these steps.
     for i in np.argsort(-steps[at]):
         close = at[first[i] : last[i]]
         left = shift[i] - float(np.sum(missing[close] * (1 - np.abs(close - at[i]) / _BESIDE)))
@@ -201,7 +202,7 @@ def _straight(index: NDArray[np.intp], t: Array) -> tuple[float, float]:
 
 
 def _drift(late: Array) -> Array:
-    """Return the slow part of the stamps' lateness, the clock's drift; zeros if the scatter explains it."""
+    """Return the slow part of the stamps' lateness [s], the clock's drift; zeros if the scatter of the stamps explains the slow part."""
     count = len(late) // _DRIFT_ROWS
     if count < 2:
         return np.zeros_like(late)
@@ -211,7 +212,7 @@ def _drift(late: Array) -> Array:
         return np.zeros_like(late)
     centres = (np.arange(count) + 0.5) * _DRIFT_ROWS - 0.5
     slow = np.interp(np.arange(len(late)), centres, means)
-    for end, inner in ((0, 1), (-1, -2)):  # go on straight beyond the outer centres
+    for end, inner in ((0, 1), (-1, -2)):  # extrapolate linearly beyond the outer centres
         slope = (means[end] - means[inner]) / (centres[end] - centres[inner])
         rows = np.arange(int(centres[0]) + 1) if end == 0 else np.arange(int(centres[-1]), len(late))
         slow[rows] = means[end] + slope * (rows - centres[end])

@@ -12,7 +12,7 @@ __all__ = ["readings"]
 
 
 def readings(arm: Arm, _travel: float) -> Iterator[Reading]:
-    """Yield the arm with gravity parameters of zero, if it has any."""
+    """Yield a reading with gravity parameters of zero, if the arm has gravity parameters other than zero."""
     weighs = arm.theta[arm.gravity_parameters] if arm.chain is None else arm.chain.gravity
     if weighs.any():
         yield reading(

@@ -1,7 +1,7 @@
 """`gravity_sign`: gravity parameters of the arm file have the wrong sign for the log.
 
-For a rotary joint 1 reversed gravity is equivalent to a zero half a turn off (`position_zero`); for an arm file with negative gravity
-parameters the sign is named.
+For a rotary joint 1 reversed gravity is equivalent to an encoder zero that is half a turn off (`position_zero`); with negative gravity
+parameters in the arm file the defect is reported as `gravity_sign`.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ __all__ = ["readings"]
 
 
 def readings(arm: Arm, _travel: float) -> Iterator[Reading]:
-    """Yield the arm with reversed gravity, if it has gravity parameters and `position_zero` does not cover the case."""
+    """Yield a reading with reversed gravity, if the arm has gravity parameters and `position_zero` does not cover the case."""
     if arm.chain is not None:
         if arm.chain.gravity.any():
             yield reading(

@@ -13,7 +13,7 @@ __all__ = ["readings"]
 
 
 def readings(arm: Arm, _travel: float) -> Iterator[Reading]:
-    """Yield every pair of joints with positions, torques or both exchanged."""
+    """Yield readings with positions, torques or both exchanged, for every pair of joints."""
     for i, j in combinations(range(1, arm.n_joints + 1), 2):
         q, tau = (f"q{i}", f"q{j}"), (f"tau{i}", f"tau{j}")
         for swap, what in (((q,), "positions"), ((tau,), "torques"), ((q, tau), "positions and torques")):

@@ -15,7 +15,7 @@ __all__ = ["readings"]
 
 
 def readings(arm: Arm, _travel: float) -> Iterator[Reading]:
-    """Yield, for arms of several joints, each joint with reversed positions, and with reversed positions and torques."""
+    """Yield readings with reversed positions, and with reversed positions and torques, for each joint of an arm of several joints."""
     if arm.n_joints == 1:
         return
     joints = range(1, arm.n_joints + 1)
@@ -26,7 +26,7 @@ def readings(arm: Arm, _travel: float) -> Iterator[Reading]:
             ((f"q{j}", f"tau{j}"), f"positions and torques of joint {j} counted the other way"),
         ):
             if arm.n_joints == 2 and len(flip) == 2 and j == 1:
-                # Both joints' signs together are no defect, so joint 1 wholly turned over is joint 2 wholly turned over.
+                # All signs of both joints reversed are no defect, so all signs of joint 1 reversed are equivalent to all signs of joint 2 reversed.
                 continue
             rest = tuple(column for column in every if column not in flip)
             yield reading("position_sign", what, Corrections(flip=flip), Corrections(flip=rest), joint=j)

@@ -10,13 +10,13 @@ from armgap.check.readings.reading import Reading, reading
 
 __all__ = ["readings"]
 
-# Travel of a joint in degrees, at least, and in turns, at most, in a log worth diagnosing.
+# Smallest travel of a joint in degrees, and largest travel in turns, in a log worth diagnosing.
 _LEAST_DEGREES = 10.0
 _MOST_TURNS = 3.0
 
 
 def readings(arm: Arm, travel: float) -> Iterator[Reading]:
-    """Yield degrees or turns as unit of positions, where possible for the largest position `travel` in the logs, for an arm with rotary joints."""
+    """Yield readings with degrees or turns as unit of positions, where the largest range `travel` of a rotary joint in the logs allows them."""
     if arm.rotary and travel < _MOST_TURNS:
         yield reading("position_unit", "positions are in turns", Corrections(unit="turns"))
     if arm.rotary and travel > _LEAST_DEGREES:

@@ -19,7 +19,7 @@ OFFSETS = (180, 90, -90)
 
 
 def readings(arm: Arm, _travel: float) -> Iterator[Reading]:
-    """Yield every rotary joint with its zero at each of `OFFSETS`."""
+    """Yield readings with the zero of positions at each of `OFFSETS`, for every joint of an arm with rotary joints."""
     if not arm.rotary:
         return
     for j in range(1, arm.n_joints + 1):

@@ -19,7 +19,7 @@ class Reading:
     check : str
         Identifier of the defect.
     what : str
-        The defect in words, continuing "as if".
+        The defect in words, as a clause after "logs and arm file agree as if".
     corrections : Corrections
         Corrections that undo the defect.
     remedies : tuple of str

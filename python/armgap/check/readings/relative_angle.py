@@ -12,7 +12,7 @@ __all__ = ["readings"]
 
 
 def readings(arm: Arm, _travel: float) -> Iterator[Reading]:
-    """Yield world-relative and link-relative positions for every joint after the first of an arm with rotary joints."""
+    """Yield readings with positions relative to the world, and relative to the preceding link, for every joint after the first of a rotary arm."""
     if not arm.rotary:
         return
     for j in range(2, arm.n_joints + 1):

@@ -36,7 +36,7 @@ _SHORTEST_PERIOD_S = 2e-5
 _EPOCH_S = (1e9, 4e9)
 # Longest time for which a torque is held, in its own sample periods.
 _HELD_PERIODS = 3.0
-# Times per finding that are kept for charts at most.
+# Largest number of times per finding that are kept for charts.
 _DRAWN = 200
 
 
@@ -69,7 +69,7 @@ def in_seconds(
         return Arrays(t, raw.q, raw.tau, raw.dq, raw.q_ref, raw.dq_ref, raw.tau_meas, raw.q_link), findings
     tau_factor = raw.tau_tick_s or scales.t_tau or _tau_unit(raw.t_tau, factor, names.t_tau, findings)
     start, tau_start = raw.t[0], raw.t_tau[0]
-    # Both clocks count from the same moment; the first position is that moment from here on.
+    # Both clocks have the same zero; from here on, times of both count from the time of the first position.
     offset = _difference(tau_start, start, tau_factor, factor)
     t_q = _Clock(_seconds(raw.t, start, factor), names.t)
     t_tau = _Clock(_seconds(raw.t_tau, tau_start, tau_factor) + offset, names.t_tau)
@@ -77,7 +77,7 @@ def in_seconds(
 
 
 def ticks(raw: Raw, scales: Scales, names: Names, arm: Arm | None, place: Path | str) -> dict[str, float]:
-    """Return the seconds per unit of the time columns, by standard name; parameters and errors as for `in_seconds`."""
+    """Return the seconds per unit of the time columns ``t`` and, for torques with their own times, ``t_tau``, by standard name."""
     factor = raw.tick_s or scales.t or _unit(raw.t, names.t, arm, place, [])
     if raw.t_tau is None or names.t_tau is None:
         return {"t": factor}
@@ -120,7 +120,7 @@ def _unit(times: Times, name: str, arm: Arm | None, place: Path | str, findings:
     if len(sure) == 1:
         findings.append(Finding("units", f"times are in {sure[0]}: {_reason(times, sure[0], period, arm)}; converted"))
         return FACTORS["t"][sure[0]]
-    # Without an arm several units may be possible; the one nearest to a millisecond is named.
+    # Without an arm several units may be possible; the error names the unit with the sample period nearest to a millisecond.
     likely.sort(key=lambda u: abs(math.log(period * FACTORS["t"][u] / 1e-3)))
     remedy = f"it looks like {likely[0]}: add --units t={likely[0]}" if likely else "give times in s"
     raise UnitError(f"the median sample period is {period:g} s, {against}", remedy=remedy, file=place, column=name)

@@ -31,15 +31,15 @@ OPTIONAL = {
     "q_link": "positions on the link's side",
     "dq_ref": "velocities",
 }
-"""Optional groups of columns, used only if every joint has one, with their names in messages."""
-#: Columns that an error message lists at most.
+"""Optional groups of columns, used only if every joint has one, with the words for each group in messages."""
+#: Largest number of columns that an error message lists.
 _LISTED = 24
 _TICKS_S = {"ns": 1e-9, "us": 1e-6, "ms": 1e-3}
 
 
 @dataclass(frozen=True)
 class Names:
-    """Column names of the recording in use, and stated units of the columns; either `tau` or `q_ref` is empty."""
+    """Names of the recording's columns in use, by standard name, and the stated units of these columns; either `tau` or `q_ref` is empty."""
 
     t: str
     q: tuple[str, ...]
@@ -54,7 +54,7 @@ class Names:
 
     @property
     def pairs(self) -> list[tuple[str, str]]:
-        """Pairs of standard name and column, for all columns in use."""
+        """Pairs of standard name and the recording's own name, for all columns in use."""
         groups = (
             ("q", self.q), ("tau", self.tau), ("dq", self.dq or ()), ("tau_meas", self.tau_meas or ()), ("q_link", self.q_link or ()),
             ("q_ref", self.q_ref), ("dq_ref", self.dq_ref or ()),
@@ -64,11 +64,11 @@ class Names:
 
     @property
     def by_key(self) -> dict[str, str]:
-        """Columns in use by standard name."""
+        """The recording's own names of the columns in use, by standard name."""
         return dict(self.pairs)
 
     def order(self, column: str) -> float:
-        """Return the share of the recording's columns that come before a column."""
+        """Return the share of the columns in use that come before `column`, a measure of the progress of reading."""
         columns = [name for _, name in self.pairs]
         return columns.index(column) / len(columns)
 
@@ -178,7 +178,7 @@ def _if_all(
     t: str,
     used: Sequence[str] = (),
 ) -> tuple[str, ...] | None:
-    """Return one column per joint if all have one on the clock of `t` that is not in `used`; a missing one that `mapping` names is an error."""
+    """Return the columns of a group if every joint has one on the clock of `t` that is not in `used`; raise if `mapping` names a missing column."""
     wanted = [f"{prefix}{j}" for j in range(1, n + 1)]
     needed = any(key in mapping for key in wanted)
     found = None
@@ -305,7 +305,7 @@ def _from_arm(index: Index, arm: Arm | None) -> dict[str, str]:
 
 
 def _from_joints(index: Index, arm: Arm | None) -> dict[str, str]:
-    """Return columns named after the joints of a chain, by standard name; all joints of a kind if one has one, so that errors name missing ones."""
+    """Return columns named after the joints of a chain, by standard name; all joints if one has a column, so that errors name missing columns."""
     if arm is None or arm.chain is None:
         return {}
     names: dict[str, str] = {}
@@ -390,7 +390,7 @@ def _times(
     """Return times as in the file, whole numbers exactly, and the seconds per unit if the column's type states it."""
     series = recording.stream_of(name).fetch(name)
     if isinstance(series.dtype, pl.Datetime | pl.Duration) and series.null_count() == 0:
-        # The type says its own unit, so the conversion guesses nothing.
+        # The type of the column states the unit of its times, so the unit need not be recognised.
         return series.to_physical().to_numpy().astype(np.int64), _TICKS_S[series.dtype.time_unit or "us"]
     if series.dtype.is_integer() and series.null_count() == 0:
         return series.cast(pl.Int64, wrap_numerical=True).to_numpy(), None

@@ -11,7 +11,7 @@ from armgap.log.recording import Recording
 
 __all__ = ["QUANTITIES", "Index"]
 
-# Name of a standard column's quantity in ROS messages, so that `q1=elbow` finds `/joint_states/elbow/position`.
+# Name of the quantity in ROS messages, by group of standard columns, so that `q1=elbow` finds `/joint_states/elbow/position`.
 QUANTITIES = {
     "q": "position", "dq": "velocity", "tau": "effort", "q_ref": "reference", "dq_ref": "reference_velocity",
 }  # fmt: skip
@@ -19,7 +19,7 @@ QUANTITIES = {
 
 @dataclass(frozen=True)
 class Index:
-    """Index of a recording's columns by all names that find them."""
+    """Index of a recording's columns by all names that stand for a column: full name, name without unit, end of a path."""
 
     recording: Recording
     place: Path | str
@@ -66,7 +66,7 @@ class Index:
         return None
 
     def unit(self, column: str) -> str | None:
-        """Return the unit that the file states for a column."""
+        """Return the unit that the file states for a column, in its metadata or in the column's name; None if it states none."""
         stated = self.recording.stream_of(column).units.get(column)
         return stated or stripped(column)[1] or suffixed(column)[1]
 

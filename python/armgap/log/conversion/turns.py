@@ -12,9 +12,9 @@ __all__ = ["TURN", "turn_jumps", "unwrapped"]
 TURN = 2 * math.pi
 """One turn of a rotary joint [rad]."""
 
-# Difference, in turns (0.13 rad), by which a jump less its turn may exceed the largest of the steps around it.
+# Difference, in turns (0.02 turns are 0.13 rad), by which a jump less its turn may exceed the largest of the steps around it.
 _SMOOTH = 0.02
-# Steps to either side that a jump is compared with; a held position makes up to so many of them zero.
+# Number of steps to either side that a jump is compared with; a held position makes at most so many steps zero.
 _AROUND = 8
 
 

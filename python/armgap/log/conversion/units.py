@@ -29,7 +29,7 @@ FACTORS: dict[str, dict[str, float]] = {
     "dq": {"rad/s": 1.0, "deg/s": _DEGREE, "m/s": 1.0, "mm/s": 1e-3},
     "tau": {"Nm": 1.0, "mNm": 1e-3, "N": 1.0, "kN": 1e3},
 }
-"""Units that can be declared for a group of columns, as factors to SI."""
+"""Factors to SI of the units that can be declared, by group of columns and unit."""
 
 WORDS = {"t": "times", "q": "positions", "dq": "velocities", "tau": "torques"}
 
@@ -41,13 +41,13 @@ _FARTHEST_M = 40.0
 _SPEED_SPAN_S = 0.02
 # Ratio of a differenced position to the velocity column that shows different units: 57.3 (degrees) or 1000 (mm), with a margin for noise.
 _DEGREE_RATIO = (40.0, 80.0)
-# Samples that determine the sample period, and whether positions move in whole encoder counts, at most.
+# Largest number of samples that determine the sample period, and whether positions change in whole encoder counts.
 _ENOUGH = 100_000
 _SURE_RATIO = (52.0, 63.0)
 _MILLI_RATIO = (700.0, 1400.0)
 # Ratio of a commanded torque to the arm's limit above which the torque is in another unit.
 _TORQUE_FACTOR = 20.0
-# Share of rows with an implausible magnitude up to which it is a defect of the rows, not a unit.
+# Share of rows with an implausible magnitude up to which the rows count as defective, not as in another unit.
 _WILD_SHARE = 0.002
 
 
@@ -95,7 +95,7 @@ def stated(names: Names, declared: Mapping[str, str], arm: Arm | None, place: Pa
     settled = set(by_user)
 
     def of(group: str, columns: tuple[str, ...]) -> NDArray[np.float64]:
-        if group in by_user:  # of an arm with both, a unit of angles leaves the lengths as they are
+        if group in by_user:  # in an arm with rotary and linear joints a unit of angles does not change lengths
             return np.where([_suits(group, declared[group], arm, j) for j in range(len(columns))], by_user[group], 1.0)
         factors = [_by_file(group, column, names.units.get(column), arm, place, j) for j, column in enumerate(columns)]
         units = {unit for column in columns if (unit := names.units.get(column)) is not None}
@@ -201,7 +201,7 @@ def recognised(arrays: Arrays, names: Names, arm: Arm | None, settled: frozenset
 
 
 def _degrees(arrays: Arrays, names: Names, arm: Arm | None) -> str:
-    """Return the reason why positions must be in degrees; empty if there is none, or a reason against it."""
+    """Return the reason why positions must be in degrees; empty if no joint gives a reason, or a joint contradicts degrees."""
     reasons = []
     for j, name in enumerate(names.q):
         if _slides(arm, j):
@@ -235,7 +235,7 @@ def in_file(
     Parameters
     ----------
     names, scales
-        Columns, and their declared or stated factors to SI.
+        Names of the columns in use, and their declared or stated factors to SI.
     ticks : mapping
         Seconds per unit of the time columns.
     arm : Arm, optional
@@ -322,7 +322,7 @@ def _reference(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None)
 
 
 def _speed_ratio(arrays: Arrays, arm: Arm | None, j: int) -> float:
-    """Return the slope of the differenced position of joint `j` over its velocity column; 0 without a velocity column."""
+    """Return the slope of the differenced position of joint `j` over its integrated velocity column; 0 if the velocity column is zero."""
     assert arrays.dq is not None
     moved = np.diff(_without_turns(arrays, arm, j))
     said = 0.5 * (arrays.dq[1:, j] + arrays.dq[:-1, j]) * np.diff(arrays.t)

@@ -24,7 +24,7 @@ FORMATS: tuple[Format, ...] = (
 )
 """Log formats, in the order in which a file is tested for them."""
 
-#: Bytes at the beginning of a file by which its format is recognised.
+#: Number of bytes at the beginning of a file by which its format is recognised.
 _HEAD = 1024
 
 

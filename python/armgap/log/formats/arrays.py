@@ -42,7 +42,7 @@ def record(
     units : mapping, optional
         Units by path, where the file states them.
     notes : tuple of Finding
-        Findings so far.
+        Findings from reading the file.
     """
     found: list[Finding] = list(notes)
     columns, stated = _columns(arrays, dict(units or {}), found)

@@ -17,7 +17,7 @@ __all__ = ["Format", "first_line", "load", "reading"]
 
 @dataclass(frozen=True)
 class Format:
-    """A format of logs.
+    """A format of log files: how its files are recognised and read.
 
     Attributes
     ----------

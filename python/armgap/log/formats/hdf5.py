@@ -39,7 +39,7 @@ def content(source: Source) -> Held:
     left_out: list[str] = []
 
     def visit(name: str, item: Any) -> None:
-        # MATLAB keeps what its cells and objects refer to in groups that start with a hash sign.
+        # MATLAB stores the contents of its cells and objects in groups whose names start with a hash sign.
         if not isinstance(item, h5py.Dataset) or name.startswith("#"):
             return
         matlab = item.attrs.get("MATLAB_class")
@@ -47,7 +47,7 @@ def content(source: Source) -> Held:
             left_out.append(f"`{name}`")
             return
         array = np.asarray(item[()])
-        held[name] = array.T if matlab is not None else array  # MATLAB stores columns first
+        held[name] = array.T if matlab is not None else array  # MATLAB stores arrays in column-major order
         for attribute in _UNIT_ATTRIBUTES:
             if (unit := unit_of(_text(item.attrs.get(attribute)))) is not None:
                 units[name] = unit

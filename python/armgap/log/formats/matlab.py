@@ -16,7 +16,7 @@ from armgap.log.recording import Recording, Source
 
 __all__ = ["FORMAT"]
 
-#: Levels of nested MATLAB structures that are read.
+#: Largest number of levels of nested MATLAB structures that are read.
 _DEEPEST = 8
 
 

@@ -23,7 +23,7 @@ from armgap.progress import report_progress
 __all__ = ["KINDS", "Message", "record"]
 
 _QUANTITIES = ("position", "velocity", "effort")
-_LOOK = 5000  # messages
+_LOOK = 5000  # messages between two reports of progress
 _TORQUE_WORDS = ("effort", "torque", "tau")
 # Rows of a message: time in ns (None without a stamp), names of columns, names of joints, values.
 Rows = list[tuple[int | None, tuple[str, ...], tuple[str, ...], list[float]]]
@@ -45,8 +45,8 @@ class _Topic:
 
     topic: str
     kind: str
-    names: tuple[str, ...]  # of the columns
-    joints: tuple[str, ...]  # of the joints, where messages name them
+    names: tuple[str, ...]  # names of the columns
+    joints: tuple[str, ...]  # names of the joints, where messages state them
     stamps: list[int | None] = field(default_factory=list)
     recorded: list[int] = field(default_factory=list)
     rows: list[list[float]] = field(default_factory=list)
@@ -63,7 +63,7 @@ class _Topic:
 
 
 def _stamp(header: Any) -> int:
-    """Return the time of a ROS message header [ns]; field names differ between ROS 1 and 2."""
+    """Return the time stamp of a ROS message header [ns]; 0 without a stamp. Field names differ between ROS 1 and 2."""
     stamp = header.stamp
     return int(getattr(stamp, "sec", 0)) * 1_000_000_000 + int(
         getattr(stamp, "nanosec", getattr(stamp, "nanosecond", 0))
@@ -102,7 +102,7 @@ def _trajectory(message: Message) -> Rows:
     for point in content.points:
         effort = _numbers(point.effort)
         if len(effort) != len(joints):
-            continue  # positions without torques are a command of another kind
+            continue  # a trajectory point without torques commands positions
         after = int(point.time_from_start.sec) * 1_000_000_000 + int(point.time_from_start.nanosec)
         rows.append((start + after, tuple(f"{joint}/effort" for joint in joints), joints, effort))
     return rows
@@ -114,7 +114,7 @@ KINDS: Mapping[str, Callable[[Message], Rows]] = {
     "std_msgs/msg/Float32MultiArray": _array,
     "trajectory_msgs/msg/JointTrajectory": _trajectory,
 }
-"""Functions that make rows of a ROS message, by type of message."""
+"""Functions that convert a ROS message to rows of a table, by type of message."""
 
 
 def record(messages: Iterable[Message], path: Path, seen: Mapping[str, str], count: int = 0) -> Recording:

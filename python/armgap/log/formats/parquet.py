@@ -38,7 +38,7 @@ def read(source: Source) -> Recording:
 def _scan(source: Source) -> pl.LazyFrame:
     data = source.data
     if data is None and not is_text(source.path):
-        data = source.path.read_bytes()  # polars takes names that are text only
+        data = source.path.read_bytes()  # polars accepts only names that are valid text
     return pl.scan_parquet(source.path if data is None else data, glob=False)
 
 

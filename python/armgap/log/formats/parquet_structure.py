@@ -1,7 +1,7 @@
 """Check of a Parquet file's structure (footer and page headers) before the file is decoded.
 
 The decoder trusts sizes and counts in page headers; overwritten ones make it ask for more memory than there is, which ends the whole
-process before anyone can catch it (about 1 in 6000 files with a few random bytes overwritten). So the structure is checked first: the
+process before an error can be caught (about 1 in 6000 files with a few random bytes overwritten). So the structure is checked first: the
 footer (Thrift compact protocol), and from there every page header. Sizes must lie within the file, values must add up to what the
 footer says, and checksums must hold where there are any.
 
@@ -21,8 +21,8 @@ from armgap.errors import LogReadError
 
 __all__ = ["check"]
 
-_TAIL = 8  # length of the footer, and the magic
-_HEADER = 1 << 16  # a page header is tens of bytes; statistics may make it longer
+_TAIL = 8  # bytes at the end of a file: length of the footer, and marker bytes
+_HEADER = 1 << 16  # largest size of a page header, bytes: usually tens of bytes, with statistics more
 _DEEPEST = 16
 _MOST_ENTRIES = 1 << 22
 _DATA_PAGE, _DATA_PAGE_V2 = 0, 3
@@ -80,7 +80,7 @@ class _Thrift:
         size = self.varint() if size == 15 else size
         if size > _MOST_ENTRIES:
             raise _BrokenError(f"holds a list of {size} entries")
-        # In lists, truth values take a byte each.
+        # In lists, each Boolean value takes one byte.
         return [self.byte() if kind in (1, 2) else self.value(kind, depth + 1) for _ in range(size)]
 
     def pairs(self, depth: int) -> list[Any]:

@@ -1,6 +1,6 @@
 """Text tables as logs: CSV in its dialects, read in blocks of lines, so that a long file needs no more memory than its numbers.
 
-Separators are commas, semicolons, tabs or blanks; with any but commas, decimal commas are allowed. A byte order mark, comments, units
+Separators are commas, semicolons, tabs or blanks; decimal commas are allowed unless commas separate. A byte order mark, comments, units
 in the header or in a row below it, and a separator at the end of every row are understood.
 """
 
@@ -30,15 +30,15 @@ _SEPARATORS = (",", ";", "\t")
 _COMMENTS = ("#", "%", "//")
 _COMMA = re.compile(r"(?:^|[;\s])[+-]?\d*,\d+(?:[eE][+-]?\d+)?(?:$|[;\s])")
 _POINT = re.compile(r"(?:^|[;\s])[+-]?\d*\.\d+(?:[eE][+-]?\d+)?(?:$|[;\s])")
-_BLOCK = 100_000  # lines
-_LOOK = 10_000  # lines
-_SAMPLE = 1000  # lines that decide on decimal commas
+_BLOCK = 100_000  # lines that are parsed at once
+_LOOK = 10_000  # lines between two updates of the number of bytes read
+_SAMPLE = 1000  # lines by which decimal commas are recognised
 _MARKS = {codecs.BOM_UTF8: "utf-8-sig", codecs.BOM_UTF16_LE: "utf-16", codecs.BOM_UTF16_BE: "utf-16"}
 
 
 @dataclass(frozen=True)
 class _Dialect:
-    """Dialect of a text table: separator, decimal mark, names and units."""
+    """Dialect of a text table: separator, decimal mark, and names and units of its columns."""
 
     separator: str
     blanks: bool
@@ -55,13 +55,13 @@ class _Dialect:
 
 @dataclass
 class _Lines:
-    """Iterator over the non-empty lines of a text table, with findings on skipped ones."""
+    """Iterator over the lines of a text table other than comments and empty lines; keeps the last comment, and whether the last line is complete."""
 
     source: Source
     encoding: str
     comment: str = ""
     complete: bool = True
-    read: int = 0  # bytes
+    read: int = 0  # bytes read so far
 
     def __iter__(self) -> Iterator[str]:
         stream = self.source.open()

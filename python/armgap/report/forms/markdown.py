@@ -11,7 +11,7 @@ from armgap.report.words import SummaryAnswer
 
 __all__ = ["markdown_of"]
 
-#: Characters of a full text bar.
+#: Width of a full text bar, in characters.
 BAR = 12
 _SPECIAL = re.compile(r"([\\`*_\[\]<>|#~&])")
 
@@ -122,7 +122,7 @@ def bar(share: float, width: int = BAR) -> str:
 
 
 def _heat(heat: HeatMap) -> tuple[list[str], list[list[str]]]:
-    """Return a heat map as header and rows of a table; the marked tile is bold."""
+    """Return a heat map as header and rows of a table; the text of a marked tile is bold."""
     width = max(len(tiles) for _, tiles in heat.rows)
     header = ["", *(["low"] + [""] * (width - 2) + ["high"] if width > 1 else [""])]
     rows = [

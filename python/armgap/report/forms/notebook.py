@@ -60,7 +60,7 @@ class NotebookDisplay:
         Parameters
         ----------
         finding : {"gap", "where", "ranking", "prediction", "error"} or Cause, default "gap"
-            Gap, map, ranking of candidates, predicted and measured positions, their difference; or evidence of a cause.
+            Gap, map of the residual torque, ranking of candidates, predicted and measured positions, their difference; or a cause, for its evidence.
         joint : int, default 1
             1-based joint of a prediction or an error.
         log : str, optional
@@ -241,13 +241,13 @@ def _curves(data: Data, what: str, joint: int, log: str | None, ax: Axes) -> Axe
 
 
 def _lifted(values: list[float], starts: list[int]) -> list[float]:
-    """Return a curve with its windows separated by NaN."""
+    """Return a curve of predictions with NaN in place of the first value of each window but the first, so that windows are drawn apart."""
     first = set(starts[1:])
     return [float("nan") if i in first else v for i, v in enumerate(values)]
 
 
 def _finish(ax: Axes, title: str, x_label: str, y_label: str) -> Axes:
-    # A dollar sign in the name of a log is no formula.
+    # A dollar sign in the name of a log does not start a formula.
     ax.set_title(title, parse_math=False)
     ax.set_xlabel(x_label)
     ax.set_ylabel(y_label)

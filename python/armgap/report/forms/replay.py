@@ -67,7 +67,7 @@ def predicted(model: Hypothesis, log: Log, horizon: float) -> Array:
     found = np.array(q)
     for first, last in zip(starts, [*starts[1:], len(t)], strict=True):
         if last - first < 2:
-            continue  # a lone sample is its own start
+            continue  # a window of one sample has nothing to predict
         try:
             found[first:last] = model.run(t[first:last], log.tau[first:last], q[first], dq[first])[0]
         except ValueError as error:
@@ -127,7 +127,7 @@ def write_replay(curves: Mapping[str, Array], log: Log, arm: Arm, path: str | Pa
         blueprint.Vertical(*(blueprint.TimeSeriesView(origin=f"q{j + 1}") for j in range(arm.n_joints))),
     )
     recording = rr.RecordingStream("armgap")
-    memory = recording.memory_recording()  # the SDK's own files fail by a message of their own
+    memory = recording.memory_recording()  # not to a file of the SDK, so that `write` reports errors
     recording.send_blueprint(layout, make_active=False)
     times = [rr.TimeColumn("time", duration=log.t)]
     for place, (name, q) in enumerate(shown.items()):

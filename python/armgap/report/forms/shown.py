@@ -22,18 +22,18 @@ __all__ = ["Facts", "arm_facts", "log_facts"]
 
 @dataclass(frozen=True)
 class Facts:
-    """Contents of a notebook display; every string may come from a user.
+    """Contents of a notebook display of an arm or a log; strings other than `sketch` may come from input files.
 
     Attributes
     ----------
     title, lead : str
         Heading, and a line below it.
     header, rows : sequences of str
-        Table.
+        Header and rows of the table.
     notes : sequence of str
         Lines below the table.
     sketch : str
-        SVG of the program's own; left out of Markdown.
+        SVG element drawn by armgap; left out of Markdown.
     """
 
     title: str

@@ -15,9 +15,9 @@ __all__ = ["candidates", "evidence", "look_alikes", "ranking", "unnamed"]
 
 #: Smallest share of the gap that is shown; smaller shares are shown as this value.
 _WORST_SHARE = -9.99
-#: Share of a cause's evidence that the law explains from which reports write "all".
+#: Share of a cause's evidence explained by its law from which a report says that the law explains all of it.
 ALL = 0.995
-#: Candidates of the ranking that are shown unfolded.
+#: Number of candidates that the ranking shows; further candidates are in a folded table.
 SHOWN = 8
 
 
@@ -61,7 +61,7 @@ def _verdict(law: Data) -> str:
 
 
 def unnamed(data: Data) -> Section | None:
-    """Return the section with dependences of the remaining residual torque, as unnamed tables."""
+    """Return the section on variables that the remaining residual torque depends on, with a chart of the torque over each variable."""
     found = data.get("unnamed") or []
     if not found:
         return None
@@ -95,7 +95,7 @@ def unnamed(data: Data) -> Section | None:
 
 
 def ranking(data: Data) -> Section | None:
-    """Return the section with the ranking of candidates by probability."""
+    """Return the section with the ranking of candidates: share of the gap that each removes alone, and probability of the named causes."""
     ranked = data.get("ranking") or []
     if not ranked:
         return None
@@ -152,7 +152,7 @@ def _course(data: Data) -> list[str]:
 
 
 def candidates(data: Data) -> Section | None:
-    """Return the section with accepted causes that are not named in the headline, and the reasons."""
+    """Return the section with candidates that were fitted but are not named as causes, and the reasons."""
     found = data.get("candidates") or []
     if not found:
         return None

@@ -9,14 +9,14 @@ from armgap.several_joints import joint_text
 __all__ = ["checks", "input_checks"]
 
 TITLE = "Checks of the input"
-#: Row ranges that a check lists at most, followed by the number of further ranges.
+#: Largest number of row ranges that the section lists per check, followed by the number of further ranges.
 LISTED = 3
 #: Words for the severities of checks, most severe first.
 _SEVERITY = {"error": "contradiction", "repaired": "repaired", "warning": "warning"}
 
 
 def checks(data: Data) -> Section | None:
-    """Return the section with checks of the input, unless it stands before the answers already."""
+    """Return the section with checks of the input; None for the verdict ``"input"``, whose report has this section before the answers."""
     return None if data["verdict"] == "input" else input_checks(data)
 
 
@@ -55,6 +55,6 @@ def _rows(ranges: list[list[int]]) -> str:
 
 
 def _remedies(check: Data) -> str:
-    """Return the remedies of a check, options and lines as code."""
+    """Return the remedies of a check as text, with command-line options and lines of the arm file as code."""
     several = check.get("remedies") or list(filter(None, [check.get("remedy")]))
     return " or ".join(f"`{r}`" for r in several)

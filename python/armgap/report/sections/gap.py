@@ -13,7 +13,7 @@ from armgap.report.words import error_text, figure, percent, unit_text, variable
 
 __all__ = ["first_picture", "gap_map"]
 
-#: Share below which a tile of the map shows one digit, to fit on a phone.
+#: Residual torque [N m or N] below which a tile of the map shows one significant digit, to fit on a phone.
 SMALL = 0.01
 #: Factor by which the map is paler for a diagnosis without a gap, whose map shows noise.
 PALE = 5.0
@@ -71,7 +71,7 @@ def _heats(data: Data, wanted: Sequence[tuple[str, str]]) -> list[HeatMap]:
 
 
 def _weights(data: Data) -> dict[int, tuple[float, float]]:
-    """Return per joint the weight of a residual torque in the joint's share of the gap, and the share."""
+    """Return per joint the factor from its residual torque to the square root of its share of the gap, and the share."""
     share = {p["joint"]: p["share"] for p in data.get("where") or []}
     key = "before" if data["verdict"] == "parameters" else "refit"
     found: dict[int, tuple[float, float]] = {}
@@ -101,7 +101,7 @@ def _tile(data: Data, regime: Data, i: int, value: float, depth: float) -> Tile:
 
 
 def _limit(regime: Data, k: int) -> str:
-    """Return a limit of a range as text; zero where it is negligible beside the largest limit."""
+    """Return the k-th limit of a regime's ranges as text; zero where it is negligible relative to the largest limit."""
     edge, largest = regime["edges"][k], max(abs(e) for e in regime["edges"])
     return figure(edge if abs(edge) > NOTHING * largest else 0.0, 2)
 
@@ -118,7 +118,7 @@ def _stands_out(data: Data, regime: Data, i: int) -> bool:
 
 
 def gap_map(data: Data) -> Section | None:
-    """The gap by joint and regime, before and after, on one scale, and as a table of figures."""
+    """Return the section with the residual torque by joint and regime for each model, as heat maps on one scale and as a table."""
     if not data.get("regimes"):
         return None
     what = load_text(data)

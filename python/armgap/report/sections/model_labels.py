@@ -19,7 +19,7 @@ _AFTER: ModelLabel = ("with causes", "after", charts.AFTER)
 
 
 def model_labels(data: Data) -> tuple[ModelLabel, ...]:
-    """Return name, key and colour of the nominal, the re-estimated and the corrected arm; without causes the corrected one is left out."""
+    """Return name, key and colour of the models of an arm: nominal, re-estimated and, if the diagnosis names causes, with causes."""
     return (_BEFORE, _REFIT, _AFTER) if data.get("causes") else (_BEFORE, _REFIT)
 
 

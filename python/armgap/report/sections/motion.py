@@ -15,7 +15,7 @@ from armgap.report.words import each_joint, figure
 __all__ = ["free_run", "horizons", "predictions"]
 
 _ARROW = " \N{RIGHTWARDS ARROW} "
-#: Distance beyond the measured positions up to which a free run is drawn, in ranges of these.
+#: Distance beyond the range of measured positions up to which a free run is drawn, as a multiple of that range.
 _REACH = 1.0
 
 

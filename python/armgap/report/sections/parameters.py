@@ -12,7 +12,7 @@ from armgap.report.words import figure, named, parameter_text, unit_text, value
 
 __all__ = ["parameters"]
 
-#: Half width of the line on which parameters are drawn, in standard deviations of the arm file; the shaded middle is two of them.
+#: Half widths of the line on which parameters are drawn, and of its shaded middle, in standard deviations of the arm file.
 _REACH = 5.0
 MIDDLE = 2.0
 _LINK_NUMBERS = 10
