@@ -20,7 +20,7 @@ if not TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: Largest change of a position when the simulator halves its steps, rad or m.
+#: Tolerance of the simulator: largest change of a position when it halves its steps, rad or m.
 TOLERANCE = 3e-6
 #: Effects that change the inertia matrix.
 ON_INERTIA = ("rotor_inertia", "rotor_coupling", "payload")
@@ -29,7 +29,7 @@ TABLE = 4001
 
 
 class EffectInstance(NamedTuple):
-    """An effect with its values; `log` names the only log that it acts in."""
+    """An effect with its joint (from 1; None for the whole arm) and values; `log` is the only log that it acts in, None for all."""
 
     effect: str
     joint: int | None
@@ -42,7 +42,7 @@ class EffectInstance(NamedTuple):
 
 
 def at_motor(sides: dict[str, str] | None) -> dict[str, float]:
-    """Return `sides` of a cause as numbers for the compiled simulator: places of encoder and friction, and motion of the rotor."""
+    """Return `sides` of a cause as 0 or 1 each: encoder at the motor, friction at the motor, and rotor carried by the joints before it."""
     if sides is None:
         return {}
     found = {f"{what}_at_motor": float(sides[what] == "motor") for what in ("encoder", "friction")}
@@ -58,11 +58,11 @@ class Hypothesis:
     arm : Arm
         Arm that gives kind, gravity and link lengths.
     theta : tuple of float
-        Parameters [SI].
+        Parameters of the arm, in the order of its file [SI].
     effects : tuple of EffectInstance
         Effects with their values.
     smoothing : tuple of float
-        Width of the smoothed sign of friction [rad/s]; 0 is dry friction.
+        Width of the smoothed sign of friction of each joint [rad/s]; 0 is dry friction.
     """
 
     arm: Arm
@@ -126,7 +126,7 @@ class Hypothesis:
 def delivered(t: Array, tau: Array, effects: Sequence[EffectInstance]) -> Array:
     """Return the mean torque at the joints in each sample interval, with effects on the command; shape of `tau`.
 
-    Each joint's command drives a unit mass that has these effects and no others: its acceleration is the torque.
+    In a simulation each joint's command drives a unit mass with these effects only; the acceleration of the mass is the torque.
     """
     found = np.array(tau, dtype=np.float64)
     for joint in {e.joint for e in effects if e.joint is not None}:

@@ -24,20 +24,22 @@ from armgap.log.log import Log
 
 __all__ = ["laws"]
 
-#: Windows that evidence is taken from at most, over all logs.
+#: Largest number of windows that evidence for a cause is taken from, over all logs.
 _WINDOWS = 160
-#: Half width of the local cubic that gives second derivatives: samples at least, and s at least.
+#: Smallest half width of the local cubics that give second derivatives, as a number of samples and as a time.
 HALF_SAMPLES, HALF_S = 8, 0.016
-#: Ranges of the variable that evidence is averaged over, samples in each at least, samples altogether at least, and points drawn at most.
+#: Largest number of ranges of the variable that evidence is averaged over, fewest samples in a range, fewest in total, and most points drawn.
 BINS, FEWEST, _ENOUGH, POINTS = 24, 4, 40, 400
-#: A joint slower than this part of its fast motion counts as at rest, where dry friction hides every torque.
+#: Speed below which a joint counts as at rest, where dry friction hides any torque, as a part of the 99th percentile of its speed.
 _REST = 0.01
-#: Evidence for an event is taken from so many of its durations before and after it, with a duration of so many s at least.
+#: Time before and after an event from which its evidence is taken, in durations of the event, and shortest duration that is assumed.
 EVENT, EVENT_S = 4.0, 0.1
 #: Two-sided 95 % quantile of the normal distribution, in standard deviations.
 NORMAL_95 = 1.96
 
+#: Effects that act on the commanded torque.
 ON_COMMAND = ("actuator_lag", "actuator_delay", "torque_saturation", "torque_dead_zone", "torque_gain")
+#: Effects that act on the encoders' readings.
 ON_ENCODER = ("encoder_offset", "encoder_eccentricity")
 
 
@@ -79,10 +81,10 @@ class Law(TypedDict):
 
 @dataclass(frozen=True)
 class EvidenceSamples:
-    """Samples that evidence is taken from; arrays of shape (n, n_joints) unless noted."""
+    """Samples of motion, torque and its rate, residual torque without the cause, and law; arrays of shape (n, n_joints) unless noted."""
 
-    t: Array  # (n,)
-    window: Array  # (n,), number of the window
+    t: Array  # (n,), times [s]
+    window: Array  # (n,), number of the window that a sample is from
     q: Array
     dq: Array
     ddq: Array
@@ -96,7 +98,7 @@ class EvidenceSamples:
 class Variable:
     """Variable that a cause's torque depends on: name with a placeholder for the joint, unit for a rotary and a linear joint, and value.
 
-    The torque of `folded` causes changes sign with the direction of motion; it is drawn as a torque along the motion.
+    For causes with `folded`, whose torque changes sign with the direction of motion, torques are drawn as positive along the motion.
     """
 
     name: str
@@ -167,7 +169,7 @@ def _evidence_logs(cause: EffectInstance, training: Sequence[Log], held: Sequenc
 
 
 def _is_in(log: Log, effect: EffectInstance) -> bool:
-    """Whether an effect acts in a log, or in the whole log that `log` is a part of."""
+    """Return whether an effect acts in a log, or in the whole log that `log` is a part of."""
     return effect.log is None or log.name in (effect.log, f"{effect.log} (first part)", f"{effect.log} (last part)")
 
 
@@ -184,7 +186,7 @@ def _law(model: Hypothesis, cause: EffectInstance, logs: Sequence[Log]) -> Law:
     shown = joint - 1 if joint is not None else _most_moved(points)
     moves = _moves(points.dq[:, shown])
     if np.count_nonzero(moves) < _ENOUGH:
-        return entry  # too few samples to say anything
+        return entry  # too few samples in motion for means
     variable = VARIABLES.get(effect, _LAW_TORQUE)
     if not np.any(points.law[moves, shown]):
         return entry  # the law adds nothing to these logs
@@ -223,7 +225,7 @@ def _most_moved(points: EvidenceSamples) -> int:
 def _points(
     model: Hypothesis, cause: EffectInstance, logs: Sequence[Log]
 ) -> tuple[EvidenceSamples | None, int, list[str]]:
-    """Return the samples of a cause's torque law from windows over all logs, the number of windows used, and why further windows were not."""
+    """Return the samples of a cause's torque law from windows over all logs, their number, and why other windows failed."""
     found: list[EvidenceSamples] = []
     failed: list[str] = []
     whole = sum(log.duration for log in logs)

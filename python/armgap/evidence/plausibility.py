@@ -63,10 +63,10 @@ def _gravity(data: dict[str, Any]) -> list[Plausibility]:
 
 
 def _largest_compliance(model: Hypothesis) -> float | None:
-    """Return the largest eigenvalue of the inverse inertia matrix over all poses; None where it is not positive definite."""
+    """Return the largest eigenvalue of the inverse inertia matrix over all poses; None if the matrix is not positive definite."""
     try:
         eigenvalues = np.linalg.eigvalsh(np.linalg.inv(model.inertia(_poses(model.arm))))
-    except ValueError:  # a pose without mobility, or more effects than the simulator carries
+    except ValueError:  # a singular inertia matrix, or more effects than the simulator carries
         return None
     return float(eigenvalues.max()) if np.isfinite(eigenvalues).all() and eigenvalues.min() > 0 else None
 

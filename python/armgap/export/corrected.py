@@ -20,8 +20,8 @@ from armgap.several_joints import place_text
 
 __all__ = ["LEAST_SIGMA", "Corrected", "placed", "value"]
 
-#: Smallest relative standard deviation of an exported parameter. An estimate's sigma holds for its own logs; tomorrow's arm is
-#: warmer, and parameters trusted to their last digit would make every other log look like a payload.
+#: Smallest relative standard deviation of an exported parameter. An estimate's sigma holds for its own logs only: at another temperature the
+#: arm's parameters differ, and with so small sigmas a diagnosis of other logs would explain the difference by an effect such as a payload.
 LEAST_SIGMA = 0.01
 
 
@@ -34,15 +34,15 @@ class Corrected(ABC):
     arm : Arm
         Arm file of the diagnosis.
     stage : str
-        Model of the diagnosis: ``"with_causes"`` or ``"refit"``.
+        Model of the diagnosis that is exported: ``"with_causes"`` or ``"refit"`` (re-estimated, without causes).
     theta, sigma : ndarray, shape (n_parameters,)
         Parameters of the arm, including causes that only change parameters, and their standard deviations [SI].
     joints : tuple of Joint
         Friction, springs, drive, encoder and stop of each joint.
     causes : tuple of Cause
-        All causes of the stage, whether or not a format has a field for them.
+        All causes of the exported model, whether or not a format has a field for them.
     notes : tuple of str
-        Remarks on the parameters.
+        Remarks on the corrected parameters, one line each.
     verdict : str
         The diagnosis' verdict.
     """
@@ -83,7 +83,7 @@ class Corrected(ABC):
         return None if cause.row else field_of(cause.effect, cause.joint, form, self.arm.kind)
 
     def missing(self, form: str) -> tuple[str, ...]:
-        """Return one line per cause for which a format has no field, or only in part."""
+        """Return one line for each cause for which a format has no field, or a field that expresses it in part only."""
         lines = []
         for cause in self.causes:
             short = FIELDS[cause.effect].short if cause.effect in FIELDS else ""
@@ -117,7 +117,7 @@ def value(cause: Cause, name: str) -> float:
 
 
 def placed(found: Cause | Equivalent) -> str:
-    """Return the name of an effect with its joint."""
+    """Return the name of an effect with its joint or joints as text."""
     if found.joint is None and not found.joints:
         return found.effect
     return f"{found.effect} of {place_text(vars(found))}"

@@ -18,7 +18,7 @@ _SAME = 1e-9
 
 
 def correct(diagnosis: Diagnosis, arm: Arm, *, stage: str = "with_causes", keep_lengths: bool = False) -> Corrected:
-    """Turn a diagnosis into a corrected model.
+    """Return the corrected model of a diagnosed arm: its estimated parameters, and the causes that were found.
 
     Parameters
     ----------
@@ -27,10 +27,10 @@ def correct(diagnosis: Diagnosis, arm: Arm, *, stage: str = "with_causes", keep_
     arm : Arm
         Arm file of the diagnosis.
     stage : {"with_causes", "refit"}, default "with_causes"
-        Re-estimated parameters with the causes, or without them.
+        Model of the diagnosis to export: re-estimated parameters with the causes, or without causes.
     keep_lengths : bool, default False
-        Keep the arm file's length of link 1 of a two-link arm, and move theta2 and theta5 to it in the ratio of their variances. By default
-        theta2 and theta5 imply the length, and the dynamics are exactly those of the diagnosis.
+        Keep the arm file's length of link 1 of a two-link arm, and change theta2 and theta5 accordingly, in the ratio of their variances. By
+        default theta2 and theta5 imply the length, and the dynamics are exactly those of the diagnosis.
 
     Returns
     -------

@@ -8,8 +8,8 @@ __all__ = ["DiagnosisFileError", "ExportError"]
 
 
 class DiagnosisFileError(OptionError):
-    """A diagnosis file is missing, not JSON, or not a diagnosis."""
+    """Error: a diagnosis file is missing, not JSON, or not a diagnosis."""
 
 
 class ExportError(OptionError):
-    """A diagnosis does not belong to the arm file, or its values describe no arm that could be built."""
+    """Error: a diagnosis does not belong to the arm file, or its values describe no physically possible arm."""

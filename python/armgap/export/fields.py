@@ -14,14 +14,14 @@ FORMATS = {"mjcf": ".xml", "urdf": ".urdf", "toml": ".toml", "json": ".json"}
 
 @dataclass(frozen=True)
 class Field:
-    """Field of each format that an effect is written to; None for a format without one.
+    """Fields in the export formats that an effect is written to; None for a format without a field for it.
 
     Attributes
     ----------
     mjcf, urdf, toml : str, optional
         Names of the fields in MJCF, URDF and arm files.
     short : str
-        Limitation of the field, or reason why no format has one.
+        What the field does not express of the effect, or reason why no format has a field.
     """
 
     mjcf: str | None = None
@@ -79,7 +79,7 @@ def field_of(effect: str, joint: int | None, form: str, kind: str) -> str | None
     effect : str
         Name of the effect.
     joint : int or None
-        1-based joint.
+        Joint of the effect, from 1; None for the whole arm.
     form : str
         Key of `FORMATS`.
     kind : str

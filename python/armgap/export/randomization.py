@@ -1,13 +1,13 @@
 """Ranges for domain randomisation: exported parameters, their standard deviations, and random models, schema ``armgap.randomization/1``.
 
-Standard deviations are those of the diagnosis. Of a serial arm's links only combinations are known well: independent draws of inertial
-parameters would give impossible links, with torques that the logs exclude. The correlations are those of a least-squares estimate along the
+Standard deviations are those of the diagnosis. Of the inertial parameters of a serial arm's links only combinations are known well: independent
+draws would give impossible links, with torques that the logs exclude. The correlations are those of a least-squares estimate along the
 diagnosed motion with the arm file's standard deviations as prior,
 
     C = (k Y' Y + diag(1/sigma^2))^-1
 
-(Ljung 1999, section 7.4), with `k`, the information in a sample's torque, such that the standard deviations agree best with the diagnosis'. They are
-then scaled to the diagnosis' values exactly. Each random model is moved to the nearest physically consistent links.
+(Ljung 1999, section 7.4), with `k`, the information in a sample's torque, such that the standard deviations agree best with the diagnosis'. The
+covariance is then scaled to the diagnosis' standard deviations exactly. Each random model is moved to the nearest physically consistent links.
 """
 
 from __future__ import annotations
@@ -35,7 +35,9 @@ SCHEMA = "armgap.randomization/1"
 _REACH = 2.0
 #: Lower end of a range, as a share of the value, for a parameter that must not be negative, or must be positive for a body.
 _LEAST_SHARE = 0.1
+#: Values tried for `k`, the information in one sample of the torques.
 _INFORMATION = 10.0 ** np.arange(0.0, 12.0, 0.25)
+#: Step of finite differences by inertial parameters, in their standard deviations.
 _STEP = 1e-6
 _ABOUT_COM = ("mass", "com_x", "com_y", "com_z", "ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 _COM_UNITS = ("kg", "m", "m", "m", *["kg m^2"] * 6)
@@ -139,7 +141,7 @@ def _of_joints(model: CorrectedSerial) -> Iterable[dict[str, Any]]:
 
 
 def _of_causes(model: Corrected) -> list[dict[str, Any]]:
-    """Return the parameters of causes with ranges; those already included in links or rotors are marked as the origin of these."""
+    """Return the parameters of all causes with ranges, also of causes whose values are already included in links or rotors."""
     return [
         _entry({"effect": cause.effect, **_place(cause), "quantity": name}, v.value, v.sigma, v.unit)
         for cause in model.causes
@@ -154,7 +156,7 @@ def _place(cause: Cause) -> dict[str, Any]:
 
 
 def _draw(model: CorrectedSerial, spread: Array, rng: np.random.Generator) -> dict[str, Any]:
-    """Return one random model: physically consistent links, and joints."""
+    """Return one random model as a JSON object: physically consistent links, and joints with rotor inertia and friction."""
     n = model.arm.n_joints
     center = np.concatenate([model.bodies.inertial.ravel(), model.bodies.rotor])
     values, vectors = np.linalg.eigh(spread)

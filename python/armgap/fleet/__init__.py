@@ -3,8 +3,8 @@
 ===========  ===============================================================================
 file         what
 ===========  ===============================================================================
-`manifest`   entries, read and checked
-`work`       one entry diagnosed, in a process of its own
+`manifest`   entries of a fleet, read from a file and checked
+`work`       diagnosis of one entry, in a process of its own
 `engines`    where entries are diagnosed: processes of this machine, or a Ray cluster
 `folder`     the folder of results: one diagnosis per entry, tables, page; existing results are kept
 `tables`     rows of the tables

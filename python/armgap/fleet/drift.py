@@ -42,29 +42,29 @@ __all__ = [
 Array = NDArray[np.float64]
 FALSE_ALARMS = 2e-3
 """Allowed false alarms of drift per visit of all robots of a fleet, over all parameters: at most one in 500 visits. With normal scatter there is one
-in about 1500, as the bound is conservative and a visit shares its evidence with those before. With twice the value a drift of 3 % per visit in a
+in about 1500, as the bound is conservative and each visit shares evidence with the visits before. With twice the value a drift of 3 % per visit in a
 scatter of 10 % is found only a fifth of a visit sooner.
 """
-# Visits before a ramp that determine its initial level, and fewest visits on the ramp.
+# Smallest number of visits before a ramp, which determine its initial level, and smallest number of visits on the ramp.
 _FEWEST_BEFORE, _FEWEST_ON = 3, 3
-# Robots that a comparison with the fleet needs: the median of three is often one of them.
+# Smallest number of robots for a comparison with the fleet's median, which of three robots is the value of one of them.
 _FEWEST_ROBOTS = 4
-# Share of the evidence for a ramp that has to remain with any one visit left out. A ramp over three visits keeps 0.6 of it without the last; one wild
-# visit keeps nothing.
+# Share of the evidence for a ramp that has to remain with any one visit left out. A ramp over three visits keeps 0.6 of it without the last; an
+# apparent ramp from one outlying visit keeps nothing.
 _STAYS = 0.5
-# Relative standard error from which an estimate says nothing about its logarithm.
+# Relative standard error from which an estimate is left out, as its logarithm is undetermined.
 _VAGUE = 0.3
 # Degrees of freedom from which the scatter of visits counts as known exactly.
 _KNOWN = 1e6
 # Largest autocorrelation: beyond it scatter is a random walk, which no test tells from a drift.
 _MOST_CORRELATION = 0.9
-# Squared change of a logarithm that counts as zero, and accuracy of the fleet's scatter, relative to the largest step.
+# Squared change of a logarithm that counts as zero, and accuracy of the fleet's scatter, relative to the largest change between two visits.
 _NOTHING, _CLOSE = 1e-30, 1e-6
-# Robust standard deviations from the fleet's median from which a robot is odd.
+# Distance from the fleet's median, in robust standard deviations, from which a robot counts as different from the others.
 _ODD = 5.0
-# Share of robots far from the median from which they count as several models, not as odd.
+# Share of robots far from the median from which the fleet counts as one of several models of robots, and no robot as different.
 _SEVERAL_MODELS = 0.2
-# Standard deviation of normal numbers over the median of their absolute values.
+# Ratio of the standard deviation of normally distributed numbers of mean zero to the median of their absolute values.
 _MAD = 1.4826
 
 
@@ -81,9 +81,9 @@ class Drift:
     rate : float
         Relative change per visit of the robot.
     evidence : float
-        Standard deviations by which the rate differs from zero.
+        Difference of the rate from zero, in its standard deviations.
     threshold : float
-        Standard deviations from which a rate counts as drift.
+        Value of `evidence` from which a rate counts as drift.
     """
 
     robot: int
@@ -188,10 +188,10 @@ def fleet_scatter(series: Array, error: Array) -> tuple[float, Array, Array]:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if excess(middle) > 0 else (low, middle)
     raw = _dispersions(steps, high)
-    # Robots cannot agree by more than they all tell.
+    # The prior has at most the degrees of freedom of all robots together.
     agreed = min(_prior_freedom(raw[seen], each[seen]), float(each.sum()))
     prior = np.full(len(series), agreed)
-    # Beside its likeliest ramp: a steep drift is no scatter.
+    # Dispersion of each robot less its likeliest ramp, so that a steep drift does not count as scatter.
     beside = _dispersions(_steps(np.array([_without_ramp(row) for row in series]), error), high)[seen]
     free = np.maximum(each[seen] - 2.0, 1.0)
     prior[seen] *= np.minimum(1.0, np.count_nonzero(seen) * _exceedance(beside * each[seen] / free, free, agreed))
@@ -252,8 +252,8 @@ def _median_of_mean_square(freedom: Array) -> Array:
 def _prior_freedom(dispersion: Array, freedom: Array) -> float:
     """Return the degrees of freedom of the fleet's scatter as prior for a robot's own scatter (Smyth 2004).
 
-    They follow from the variance of the robots' log dispersions beyond chance and one standard error:
-    ``var log s^2 = psi'(d/2) + psi'(d0/2)``; robust over the robots, with ``psi'(x) = 1/x + 1/(2 x^2) + 1/(6 x^3)`` and its inverse ``1/2 + 1/y``.
+    These degrees of freedom `d0` follow from the variance of the robots' log dispersions beyond chance and one standard error, estimated robustly:
+    ``var log s^2 = psi'(d/2) + psi'(d0/2)``, with ``psi'(x) = 1/x + 1/(2 x^2) + 1/(6 x^3)`` and its inverse ``1/2 + 1/y``.
     """
     if len(dispersion) < _FEWEST_ROBOTS:
         return _KNOWN
@@ -267,7 +267,7 @@ def _prior_freedom(dispersion: Array, freedom: Array) -> float:
 
 
 def _without_ramp(row: Array) -> Array:
-    """Return logarithms of one robot less level and ramp, with the onset of the least squares minimum, NaN where unknown."""
+    """Return logarithms of one robot less the level and ramp that fit them best by least squares over all onsets; NaN where unknown."""
     known = np.flatnonzero(np.isfinite(row))
     rest = row.copy()
     if len(known) < _FEWEST_BEFORE + _FEWEST_ON:
@@ -298,7 +298,7 @@ def threshold(allowed: float, length: float, freedom: float) -> float:
     length : float
         Length of the curve of normed ramps on the sphere [rad].
     freedom : float
-        Degrees of freedom behind the scatter.
+        Degrees of freedom of the estimated scatter.
     """
     return float(np.sqrt(freedom * np.expm1(2.0 / freedom * np.log((1.0 + length / np.pi) / allowed))))
 
@@ -310,9 +310,9 @@ class _Equations:
     Attributes
     ----------
     row, weight : ndarray, shape (n_visits,)
-        Logarithms, and the inverse variance of each equation.
+        Logarithms of one robot's parameter by visit, and the inverse variance of each equation.
     correlation : float
-        First-order autocorrelation.
+        First-order autocorrelation of deviations from visit to visit.
     """
 
     row: Array
@@ -337,7 +337,7 @@ class _Equations:
         return np.asarray(x - part[..., None] * y)
 
     def level(self) -> Array:
-        """Whitened column of the unknown level, shape (n_visits,)."""
+        """Return the whitened column of the unknown level, shape (n_visits,)."""
         return self.whitened(np.ones(len(self.row)))
 
     def slopes(self) -> tuple[Array, Array, float]:
@@ -349,7 +349,7 @@ class _Equations:
         return (ramps * self.weight) @ self.whitened(self.row) / square, 1.0 / np.sqrt(square), float(turned.sum())
 
     def without_one(self, onset: int) -> float:
-        """Return the least evidence for a ramp with any one visit left out, which gives the visit a parameter of its own."""
+        """Return the least evidence, in standard deviations, for a ramp with any one visit left out by a parameter of its own."""
         visit = self.whitened(np.eye(len(self.row)))
         ramps = self.beside(self.beside(self.ramps()[onset], visit), self.beside(self.level(), visit))
         part, square = (ramps * self.weight) @ self.whitened(self.row), (ramps**2) @ self.weight
@@ -368,7 +368,7 @@ def _drift(equations: _Equations, visits: NDArray[np.intp], robot: int, freedom:
 
 
 def odd_ones(values: Array) -> list[tuple[int, float, float, float]]:
-    """Return robots whose median value is far from the other robots', the farthest first; none where many are, as in a fleet of several models.
+    """Return the robots whose median value is far from the others', the farthest first; none if many are far, as in a fleet of several models.
 
     Parameters
     ----------

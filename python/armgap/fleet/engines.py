@@ -19,8 +19,9 @@ from armgap.workers import THREADS, one_thread
 
 __all__ = ["ENGINES", "Engine", "EngineMissingError"]
 
+# Function that diagnoses entries and yields each with its outcome as it arrives.
 Engine = Callable[..., Iterator[tuple[Entry, Outcome]]]
-# Entries per worker that are handed out ahead: enough that no worker waits, few enough that memory stays bounded.
+# Entries per worker that are submitted at a time: enough that no worker waits, few enough that memory stays bounded.
 _AHEAD = 2
 
 
@@ -35,7 +36,7 @@ class EngineMissingError(ArmgapError, ImportError):
 def local(
     entries: Sequence[Entry], settings: Mapping[str, Any], *, workers: int, limit_s: float, address: str | None
 ) -> Iterator[tuple[Entry, Outcome]]:
-    """Diagnose entries in processes of this machine, one thread each; a process that dies or takes too long costs its entry only."""
+    """Diagnose entries in processes of this machine, one thread each; if one dies or takes too long, only its entry fails."""
     if address is not None:
         raise OptionError("--address is for --engine ray", remedy="leave it out")
     with one_thread(), pebble.ProcessPool(max_workers=workers, context=get_context("spawn")) as pool:

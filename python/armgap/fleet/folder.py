@@ -26,7 +26,7 @@ _SUMMARY, _PARAMETERS, _PAGE = "summary.parquet", "parameters.parquet", "index.h
 
 
 def belongs(path: Path) -> bool:
-    """Whether a file in the folder of results is one that a fleet writes."""
+    """Return whether a file or folder in a folder of results is one that a fleet writes."""
     return path.name in (_DIAGNOSES, _SUMMARY, _PARAMETERS, _PAGE)
 
 
@@ -39,7 +39,7 @@ class Fleet:
     folder : Path
         Folder of the results.
     summary, parameters : polars.DataFrame
-        The tables, see docs/formats.md.
+        Tables of named causes, and of parameters, see docs/formats.md.
     answered : int
         Number of entries computed by this run; results of other entries existed already.
     settings : mapping
@@ -54,7 +54,7 @@ class Fleet:
 
     @property
     def failed(self) -> pl.DataFrame:
-        """Entries without a diagnosis, with the reason."""
+        """Rows of the summary for entries without a diagnosis, with the reason in the column ``error``."""
         return self.summary.filter(pl.col("error").is_not_null())
 
 
@@ -84,7 +84,7 @@ def run_fleet(
     engine : str, default "local"
         ``"local"``: processes of this machine; ``"ray"``: a Ray cluster.
     workers : int, default 1
-        Processes.
+        Number of processes.
     limit_s : float, default 600
         Longest time for one entry [s].
     address : str, optional
@@ -92,12 +92,12 @@ def run_fleet(
     again : bool, default False
         Whether to repeat diagnoses whose results exist.
     progress : callable, optional
-        Called with the number of entries done and of all entries.
+        Function that is called with the number of entries done and the number of entries to be done.
 
     Raises
     ------
     OptionError
-        If the engine is not known, or a number is impossible.
+        If the engine is not known, or the number of workers or the time limit is not above zero.
     ResultError
         If the folder cannot be written to.
     """

@@ -27,7 +27,7 @@ class ManifestError(ArmgapError):
 
 @dataclass(frozen=True)
 class Entry:
-    """One diagnosis of a fleet.
+    """One entry of a fleet's manifest: the input of one diagnosis.
 
     Attributes
     ----------
@@ -38,9 +38,9 @@ class Entry:
     logs, holdout : tuple of str
         Paths or URLs of the robot's logs; without a holdout the last part of every log is held out.
     time : str
-        When the logs were recorded, ISO 8601; empty where that is unknown.
+        Time at which the logs were recorded, ISO 8601; empty where it is unknown.
     row : int
-        Row of the manifest, counted from 1.
+        Number of the entry's row in the manifest, from 1.
     """
 
     robot: str
@@ -57,7 +57,7 @@ class Entry:
 
 
 def is_url(word: str) -> bool:
-    """Whether a log is given by a URL, not by a path."""
+    """Return whether a log is given by a URL, not by a path."""
     return "://" in word
 
 

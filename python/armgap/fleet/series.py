@@ -18,7 +18,7 @@ _DAY = len("2026-01-05")
 
 @dataclass(frozen=True)
 class Series:
-    """One parameter of all robots.
+    """Estimates of one parameter of all robots of a fleet, by robot and visit.
 
     Attributes
     ----------
@@ -27,7 +27,7 @@ class Series:
     robots : list of str
         Names of the robots, one per row.
     times : list of list of str
-        When each value was estimated; empty where that is unknown or there is no value.
+        Time of recording of each value's logs, ISO 8601; empty where it is unknown or there is no value.
     values, sigma : ndarray, shape (n_robots, n_visits)
         Estimates and standard errors, NaN for none. A column holds visits of the same day: the first of each robot on that day,
         or the second, and so on. Without times the first visits of all robots stand in one column.
@@ -67,7 +67,7 @@ class Move:
 
 @dataclass(frozen=True)
 class Odd:
-    """A parameter of one robot whose median `usual` differs from the `fleet`'s median by `apart` robust standard deviations, in its unit."""
+    """A parameter of one robot whose median over visits, `usual`, is `apart` robust standard deviations from the fleet's median, `fleet`."""
 
     robot: str
     of: str
@@ -78,7 +78,7 @@ class Odd:
 
 
 def series_of(parameters: pl.DataFrame) -> list[Series]:
-    """Return the series of a fleet.
+    """Return the estimates of a fleet's parameters by robot and visit, one `Series` per parameter.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def series_of(parameters: pl.DataFrame) -> list[Series]:
     """
     place = ["robot", "of", "name"]
     day = pl.col("time").fill_null("").str.slice(0, _DAY)
-    # Entries without a time stand in the order of the manifest.
+    # Entries without a time come first, in the order of the manifest.
     dated = parameters.with_columns(day=day).sort("time", nulls_last=False, maintain_order=True)
     counted = dated.with_columns(count=pl.int_range(pl.len()).over([*place, "day"]))
     groups = counted.group_by(["of", "name"], maintain_order=True)
@@ -108,7 +108,7 @@ def _series(of: str, name: str, table: pl.DataFrame) -> Series:
 
 
 def moving(parameters: pl.DataFrame) -> Iterator[Move]:
-    """Yield the drifting parameters of arms and of causes, by name, strongest evidence of each name first.
+    """Yield the drifting parameters of arms and of causes, grouped by parameter, in each group the strongest evidence first.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def moving(parameters: pl.DataFrame) -> Iterator[Move]:
 
 
 def odd(parameters: pl.DataFrame) -> list[Odd]:
-    """Return robots whose parameters lie far from the others', the farthest first.
+    """Return the parameters of robots that lie far from those of the other robots, the farthest first.
 
     Parameters
     ----------

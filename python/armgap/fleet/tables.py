@@ -35,7 +35,7 @@ PARAMETERS: dict[str, type[pl.DataType]] = {
     "sigma": pl.Float64,
     "unit": pl.String,
 }
-"""Columns of ``parameters.parquet``; `of` is ``arm`` or ``effect:joint``."""
+"""Columns of ``parameters.parquet``, one row per parameter of an entry; `of` is its owner, ``arm`` or ``effect:joint``."""
 
 
 def summary_rows(entry: Entry, diagnosis: dict[str, Any]) -> list[Row]:

@@ -20,13 +20,13 @@ __all__ = ["Outcome", "answer", "answer_within", "content_key", "took_too_long"]
 
 Outcome = dict[str, Any]
 """Outcome of an entry: ``diagnosis`` (JSON text), ``error`` (one line), or ``lost`` (reason why there is neither); and ``seconds``."""
-#: Time between repeated alarms [s]: an exception raised inside a destructor or a callback of another library is swallowed.
+#: Time between alarms at the time limit [s]; they repeat, as an exception raised in a destructor or a callback of another library is lost.
 _ALARM_AGAIN_S = 0.5
 _READERS: dict[str, Callable[[str], pl.DataFrame]] = {".parquet": pl.read_parquet, ".csv": pl.read_csv}
 
 
 def content_key(entry: Entry, settings: Mapping[str, Any]) -> str:
-    """Return a hash of all that a result depends on: content of the files, settings and version; for a URL its text.
+    """Return a hash of all that an entry's result depends on: content of its files (of a URL the address), settings and version.
 
     A file that cannot be read counts by its name, so that the entry is tried again once the file exists.
     """
@@ -52,7 +52,7 @@ def answer(entry: Entry, settings: Mapping[str, Any]) -> Outcome:
     Parameters
     ----------
     entry : Entry
-        Arm and logs.
+        Entry with the arm file and the logs.
     settings : mapping
         Keyword arguments of `armgap.diagnose`.
     """
@@ -65,7 +65,7 @@ def answer(entry: Entry, settings: Mapping[str, Any]) -> Outcome:
         outcome: Outcome = {"diagnosis": found.to_json()}
     except ArmgapError as error:
         outcome = {"error": str(error)}
-    except Exception as error:  # one entry must not end the others; what it was stands in its row
+    except Exception as error:  # an error in one entry must not end the others; it is stated in the entry's row
         outcome = {"error": f"{type(error).__name__}: {' '.join(str(error).split())}"}
     return {**outcome, "seconds": time.perf_counter() - start}
 
@@ -85,7 +85,7 @@ def answer_within(entry: Entry, settings: Mapping[str, Any], limit_s: float) -> 
     Parameters
     ----------
     entry, settings
-        As for `answer`.
+        Entry of the manifest, and keyword arguments of `armgap.diagnose`.
     limit_s : float
         Time limit [s], above 0.
     """

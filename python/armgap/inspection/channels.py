@@ -17,15 +17,17 @@ __all__ = ["FlatTop", "JointChannels", "joint", "step_of"]
 if not TYPE_CHECKING:
     __getattr__ = old_names(__name__)
 
-# Number of changes between samples from which the step of a channel is determined at most.
+# Largest number of changes between samples from which the step of a channel is determined.
 _ENOUGH = 200_000
+# Largest number of changes of a channel between samples, the smallest ones, to which its step is fitted.
 _SMALLEST = 2000
 # Changes of a channel are whole multiples of a step if at least this share of them (second) lies this close (first, in steps).
 _CLOSE, _MOST = 0.05, 0.97
-# Samples in a row for which a torque stays at its extreme, at least, where it is cut off.
+# Smallest number of samples in a row at its extreme for which a torque counts as cut off.
 _FLAT_SAMPLES = 5
+# Distance from a torque's extreme, as a part of the largest absolute torque, within which a sample counts as at the extreme.
 _FLAT_MARGIN = 1e-6
-# A joint rests where it moves over this time by no more than two steps, and slower than this part (second number) of its top speed.
+# A joint counts as at rest if it moves over the time _SPAN_S by at most _REST_STEPS steps, or at most at the part _REST_SHARE of its top speed.
 _SPAN_S = 0.02
 _REST_STEPS = 2.0
 _REST_SHARE = 1e-3
@@ -33,7 +35,7 @@ _REST_SHARE = 1e-3
 
 @dataclass(frozen=True)
 class FlatTop:
-    """A level at which a torque is cut off: share of the samples at the level, and longest uninterrupted time [s]."""
+    """A level [N m or N] at which a torque is cut off, with the share of the samples at this level and the longest time without a break [s]."""
 
     level: float
     share: float
@@ -53,13 +55,13 @@ class JointChannels:
     q_step, tau_step : float, optional
         Step of which all changes of position or torque are whole multiples; None without a step.
     q_step_arm : float, optional
-        Encoder step of the arm file [rad or m].
+        Encoder step that the arm file states [rad or m]; None where it states none.
     top_speed : float
         Speed exceeded for 1 % of the time [rad/s or m/s].
     rest, motion : float
         Shares of the time at rest and in motion.
     reversals : int
-        Number of changes of direction.
+        Number of changes of the joint's direction of motion.
     flat_tops : tuple of FlatTop
         Levels at which the torque is cut off.
     """
@@ -78,7 +80,7 @@ class JointChannels:
 
 
 def joint(log: Log, j: int, arm: Arm | None) -> JointChannels:
-    """Return the properties of position and torque of joint `j` (from 0)."""
+    """Return the properties of position and torque of joint `j` (from 0) in a log."""
     q = np.ascontiguousarray(log.q[:, j])
     tau = np.ascontiguousarray(log.tau[:, j]) if log.has_torques else None
     step = step_of(q)
@@ -114,13 +116,13 @@ def step_of(values: NDArray[np.float64]) -> float | None:
     moved = np.sort(moved[moved > 1e-12 * max(float(np.abs(values[:_ENOUGH]).max()), 1e-300)])[:_SMALLEST]
     if len(moved) < 20:
         return None
-    # The smallest change seen may itself be several steps; the largest step that fits is the one.
+    # The smallest change seen may itself be several steps; the largest step that fits is taken.
     return next((step for parts in (1, 2, 3) if (step := _fitted(moved, float(moved[0]) / parts)) is not None), None)
 
 
 def _fitted(moved: NDArray[np.float64], step: float) -> float | None:
     """Return the step nearest to a guess; None if changes are not whole multiples of it."""
-    for most in (5, 50, 500):  # small multiples first, so that the guess's error does not add up
+    for most in (5, 50, 500):  # the step is fitted to small multiples first, so that errors of the guess do not add up
         multiples = np.round(moved / step)
         near = (multiples >= 1) & (multiples <= most)
         if near.any():

@@ -29,14 +29,15 @@ __all__ = ["Excitation", "ParameterExcitation", "excitation"]
 if not TYPE_CHECKING:
     __getattr__ = old_names(__name__)
 
-#: Variance of an unknown parameter, in squares of its unit: far above the information of any log.
+#: Initial variance of a parameter in recursive least squares, in squares of its SI unit: so large that it does not matter.
 _P0 = 1e9
-_CUTOFF = 50.0  # rad/s
-_BUDGET = 200_000  # samples
-# White error, as a part of the RMS torque, for which standard deviations of parameters are stated.
+_CUTOFF = 50.0  # cut-off of the filters of the regression, rad/s
+_BUDGET = 200_000  # largest number of samples of a log that are used
+# RMS of the white torque error, as a part of the RMS torque, for which standard deviations of parameters are stated.
 _ERROR = 0.01
-# Information below this part of the largest counts as none, within rounding.
+# Part of the largest eigenvalue of the information matrix below which an eigenvalue counts as zero, within rounding.
 _NOTHING = 1e-14
+# Standard deviation, as a part of the value, below which a parameter counts as well excited, and from which as not excited.
 _WELL, _HARDLY = 0.05, 0.5
 
 
@@ -78,7 +79,7 @@ class Excitation:
     weakest : str
         Combination of parameters that the log excites least.
     samples : int
-        Samples used.
+        Number of samples of the log that were used.
     """
 
     condition: float
@@ -124,7 +125,7 @@ def _word(sigma: float) -> str:
 
 
 def _combination(direction: NDArray[np.float64], arm: Arm) -> str:
-    """Name the parameters with the largest parts in a direction of parameter space."""
+    """Return a direction of parameter space as text: coefficients and names of the parameters with the largest parts."""
     direction = direction / direction[np.argmax(np.abs(direction))]
     terms = [
         (abs(c), f"{c:+.2g} {name}") for c, name in zip(direction, arm.parameter_names, strict=True) if abs(c) > 0.2

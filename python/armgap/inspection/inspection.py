@@ -22,21 +22,22 @@ from armgap.progress import report_progress
 
 __all__ = ["Inspection", "inspect"]
 
-# Horizon of predictions in the checks against the arm file [s], with parameters from an earlier part of the log.
+# Horizon of predictions in the checks against the arm file [s].
 _HORIZON_S = 0.25
+# Part of a log, from its start, to which the checks against the arm file fit parameters; the rest is predicted.
 _LEARNT = 0.6
 
 
 @dataclass(frozen=True)
 class Inspection:
-    """The result of `inspect`.
+    """The inspection of one log, the result of `inspect`.
 
     Attributes
     ----------
     log : str
         Name of the log.
     columns : dict
-        Column names of the file by standard name.
+        Name of the column in the file for each standard name, such as ``q1``.
     sampling : Sampling
         Rate, jitter and gaps of the samples.
     joints : tuple of JointChannels
@@ -46,13 +47,13 @@ class Inspection:
     findings : tuple of Finding
         Remarks from reading the log: recognised, changed or unusual contents.
     source : Log
-        The log itself.
+        The log that was inspected, after repairs.
     rotary : bool, optional
         Whether the joints are rotary; None without an arm, and for an arm with rotary and linear joints.
     kind : str
         Kind of the arm; empty without one.
     checks : tuple of Check
-        Defects of the log by itself and against the arm file.
+        Defects found in the log by itself and in comparison with the arm file.
     """
 
     log: str
@@ -68,7 +69,7 @@ class Inspection:
 
     @property
     def units(self) -> tuple[str, str]:
-        """Units of positions and of torques; rotary and linear ones if no arm is given."""
+        """Units of positions and of torques, in words; both the rotary and the linear unit if joints are of unknown or of both kinds."""
         if self.rotary is None:
             return "rad or m", "N m or N"
         return ("rad", "N m") if self.rotary else ("m", "N")
@@ -108,7 +109,7 @@ def inspect(log: Any, arm: Arm | None = None, *, repair: bool = True) -> Inspect
     Raises
     ------
     OptionError
-        If a pattern stands for several logs.
+        If `log` is a pattern of file names that stands for several logs.
     LogShapeError
         If the arm has another number of joints.
 
@@ -153,7 +154,7 @@ def inspect(log: Any, arm: Arm | None = None, *, repair: bool = True) -> Inspect
 
 
 def _checked(log: Log, arm: Arm | None, *, repair: bool) -> tuple[Log, tuple[Check, ...]]:
-    """Return the repaired log, and its checks; those against the arm test the last part with parameters from the first part."""
+    """Return the repaired log and its defects; for checks against the arm, parameters from the first part of the log predict the last part."""
     log, checks = data_checks(log, arm, repair=repair)
     if arm is None or arm.chain is not None or log.duration < 4 * _HORIZON_S:
         return log, tuple(checks)

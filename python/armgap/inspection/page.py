@@ -18,7 +18,7 @@ from armgap.report.words import SummaryAnswer
 
 __all__ = ["render"]
 
-#: Points of a drawn line, or bars of a histogram, at most: more than a screen resolves.
+#: Largest numbers of points of a drawn line and of bars of a histogram: more than a screen resolves.
 _POINTS = 1500
 _BINS = 60
 #: Marks of findings in curves: words, shape and colour by kind of finding.
@@ -96,7 +96,7 @@ def _over_time(found: Inspection) -> list[Any]:
 
 
 def _mark(chart: Any, found: Inspection, low: float) -> None:
-    """Mark rows that were left out, and gaps, below a curve."""
+    """Mark times of rows that were left out, and of gaps, at the height `low` in a chart."""
     for kind, (label, marker, colour) in _MARKS.items():
         times = [t for f in found.findings if f.kind == kind for t in f.times]
         if times:
@@ -106,7 +106,7 @@ def _mark(chart: Any, found: Inspection, low: float) -> None:
 
 
 def _envelope(t: NDArray[np.float64], values: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the smallest and largest value of each part of a curve, so that no peak is lost in a drawing."""
+    """Return times and values of a curve for drawing: smallest and largest value of each part, so that no peak is lost."""
     rows = len(t) // _POINTS
     if rows < 3:
         return t, values

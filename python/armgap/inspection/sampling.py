@@ -13,7 +13,7 @@ __all__ = ["Sampling", "sampling"]
 GAP_PERIODS = 3.0
 """Length of a hole in the samples, in sample periods, from which it counts as a gap."""
 
-#: Gaps that are listed at most.
+#: Largest number of gaps that are listed.
 _LISTED = 5
 
 
@@ -26,15 +26,15 @@ class Sampling:
     samples : int
         Number of samples.
     duration_s, period_s, rate_hz : float
-        Duration, median period, and its inverse.
+        Duration of the log [s], median sample period [s], and sample rate [Hz], the inverse of the period.
     jitter_s, jitter_max_s : float
-        Standard deviation of the periods without gaps, and the largest difference from the median among them.
+        Standard deviation of the sample periods without gaps, and their largest difference from the median [s].
     gaps : int
-        Holes longer than three periods.
+        Number of holes in the samples longer than three periods.
     gap_s : float
         Sum of the gaps' lengths [s].
     widest : tuple of (float, float)
-        Time and length of the widest gaps, widest first [s].
+        Time and length of the widest gaps, five at most, the widest first [s].
     """
 
     samples: int

@@ -51,9 +51,9 @@ class Column:
     unit : str or None
         Unit that the file states.
     rows, missing : int
-        Rows, and rows without a finite number.
+        Number of rows, and of rows without a finite number.
     low, high : float or None
-        Range of the numbers; None for a column without numbers.
+        Smallest and largest number; None for a column without numbers.
     trend : str
         ``"rising"`` (as times do), ``"constant"``, ``"varies"``, or ``"text"``.
     """
@@ -79,7 +79,7 @@ class Columns:
     columns : tuple of Column
         Every column of the file.
     proposed : dict
-        Column by standard name; ``"NAME"`` where no column is suggested.
+        Name of the suggested column for each standard name; ``"NAME"`` where no column is suggested.
     units : dict
         Units by group that the proposed mapping needs, such as ``{"q": "deg"}``.
     """
@@ -178,7 +178,7 @@ def _numbered(names: list[str]) -> list[str]:
 
 
 def _kind(column: Column) -> str | None:
-    """Return the quantity that a column seems to hold, by the words of its name; None if unknown. A time column also has to rise."""
+    """Return the quantity that a column seems to hold, by the words of its name; None if unknown. The values of a time also have to rise."""
     words = [w for w in re.split(r"[^a-z0-9]+", _spread(column.name)) if w]
     if column.trend == "rising" and any(_TIME.fullmatch(w) for w in words):
         return "t"
@@ -199,7 +199,7 @@ def _units(path: str | Path, proposed: dict[str, str], arm: Arm | None) -> dict[
     units: dict[str, str] = {}
     if _PLACEHOLDER in proposed.values() or str(path) == "-":
         return units
-    for _ in range(3):  # times, positions, velocities or torques
+    for _ in range(3):  # at most three groups need a unit: times, positions, and velocities or torques
         try:
             Log.read(path, columns=proposed, units=units, arm=arm)
         except UnitError as error:

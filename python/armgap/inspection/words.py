@@ -18,12 +18,12 @@ __all__ = ["COLUMN_HEADER", "column_rows", "grids", "overview", "proposal"]
 Grid = tuple[list[str], list[list[str]]]
 COLUMN_HEADER = ("column", "type", "unit", "lowest", "highest", "trend", "missing")
 """Header of the table of a file's columns without a mapping to standard names."""
-_UNKNOWN = 10.0  # ten times the value
+_UNKNOWN = 10.0  # standard deviation, as a multiple of a parameter's value, from which the parameter is unknown
 _RECOMMENDED = 100.0  # condition number up to which a motion counts as a good one
 
 
 def overview(found: Inspection) -> list[tuple[str, str]]:
-    """Return questions and answers on a whole log."""
+    """Return properties of a whole log as pairs of label and text: columns, samples, rate, jitter, gaps, excitation."""
     s = found.sampling
     answers = [
         (
@@ -87,7 +87,7 @@ def _excitation(e: Excitation) -> str:
 
 
 def grids(found: Inspection) -> list[tuple[str, Grid]]:
-    """Return titles and tables of an inspection."""
+    """Return the tables of an inspection with their titles: joints, and with an arm its parameters."""
     all_grids = [("Joints", _joints(found))]
     if found.excitation is not None:
         share = "Standard deviation of each parameter if the torque carried white noise of 1 % of its RMS"
@@ -139,7 +139,7 @@ def _parameters(e: Excitation) -> Grid:
 
 
 def column_rows(found: Columns) -> list[tuple[str, ...]]:
-    """Return one table row per column of a file without a mapping."""
+    """Return one table row per column of a file without a mapping to standard names."""
 
     def number(value: float | None) -> str:
         return "" if value is None else f"{value:.6g}"
@@ -151,7 +151,7 @@ def column_rows(found: Columns) -> list[tuple[str, ...]]:
 
 
 def proposal(found: Columns, file: str) -> list[str]:
-    """Return lines with a command to try for a file without a mapping, and with what to verify."""
+    """Return lines with a command that reads a file by the proposed mapping of its columns, and with what the user has to verify."""
     lines = [
         "not all of t, q1, tau1 and so on are there, and no mapping was given; by their names these may be meant:",
         f"armgap inspect {shlex.quote(file)} {found.options}",

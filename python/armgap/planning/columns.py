@@ -1,4 +1,4 @@
-"""Linear least squares: parameters of arm and rival, the arm's with their prior, fitted to a difference of predictions."""
+"""Linear least squares: values of the arm, with a prior, and of a rival are fitted to a difference of two models' predictions."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 
 class Fitted(NamedTuple):
-    """Result of a fit to a difference of predictions: values, remaining difference in standard deviations, and its square plus that of the prior."""
+    """Fit to a difference of predictions: values, remaining difference in standard deviations, and sum of its and the prior's squared residuals."""
 
     values: Array
     left: Array
@@ -28,13 +28,13 @@ class Columns:
     Attributes
     ----------
     common : ndarray, shape (n_numbers, n_common)
-        Columns of the values that every model fits, in standard deviations of the prior.
+        Derivatives of the predictions by the values that every model fits, per standard deviation of their prior.
     free : ndarray, shape (n_numbers, n_free)
-        Columns of the rival's own values, without a prior.
+        Derivatives of the predictions by the rival's own values, which have no prior.
     names : tuple of str
         Names of the rival's own values.
     simulated : int
-        Leading columns of `common` that are parameters of the arm.
+        Number of leading columns of `common` that belong to parameters of the arm; the rest belongs to nuisances.
     """
 
     common: Array
@@ -43,7 +43,7 @@ class Columns:
     simulated: int
 
     def product(self, values: Array, *, simulated: bool) -> Array:
-        """Return the change of the predictions by some values; `simulated` leaves out nuisances, which no simulation has."""
+        """Return the change of the predictions for changes of the values; if `simulated`, without nuisances, which the simulator does not have."""
         common = values[: self.common.shape[1]].copy()
         if simulated:
             common[self.simulated :] = 0.0
@@ -53,12 +53,12 @@ class Columns:
         """Return the weighted least-squares fit of the columns to a difference of predictions."""
         n, k = self.common.shape[1], self.free.shape[1]
         columns = np.hstack([self.common, self.free]) * weight[:, None]
-        # Values without a prior in units of what they do, so that they are as well scaled as the rest.
+        # Columns without a prior are normed, so that they are as well scaled as those with a prior.
         unit = np.append(np.ones(n), np.maximum(np.linalg.norm(columns[:, n:], axis=0), 1e-300))
         prior = np.hstack([np.eye(n), np.zeros((n, k))])
         rows = np.vstack([columns / unit, prior])
         right = np.concatenate([delta * weight, np.zeros(n)])
         solution = np.linalg.lstsq(rows, right, rcond=1e-12)[0]
         left = right - rows @ solution
-        # The prior's part counts: values that the rival would need and that are not trusted speak against it.
+        # The prior's residuals count: a rival that needs implausible values of the arm is less likely.
         return Fitted(solution / unit, left[: len(delta)], float(left @ left))

@@ -1,8 +1,8 @@
 """Expected evidence of a motion for one model against another (T-optimality, Atkinson and Fedorov 1975).
 
-Both models predict the motion's windows from the same starts under the same torques, as a diagnosis does. The difference of their
-predictions counts that remains after the rival's values, all of the arm's (with the arm file's standard deviations as prior) and a diagnosis'
-nuisances are fitted to it to first order; half of its square, in units of noise and discrepancy, is the expected log-likelihood ratio.
+Both models predict the motion's windows from the same starts under the same torques, as a diagnosis does. The rival's values, all of the
+arm's (with the arm file's standard deviations as prior) and a diagnosis' nuisances are fitted to the difference of the predictions to first
+order; half the square of the remaining difference, in units of noise and discrepancy, is the expected log-likelihood ratio.
 
 A decision of `armgap.diagnose` needs more than a likely effect: without the effect the gap has to exceed the noise floor, and most
 windows have to prefer the effect. Both conditions are evaluated too, with the diagnosis' thresholds.
@@ -33,19 +33,19 @@ Array = NDArray[np.float64]
 
 #: Samples per prediction window at which motions are predicted, at most as dense as those of a log.
 WINDOW_SAMPLES = 50
-#: Polynomials per window and joint that represent predictions; those of degree 0 and 1 take up the error of the initial state.
+#: Highest degree of the polynomials that represent predictions in a window; degrees 0 and 1, which take up errors of the initial state, are left out.
 DEGREES = 12
 #: Smallest assumed discrepancy of the best model, as a part of the noise floor.
 LEAST_DISCREPANCY = 0.3
-#: RMS of t^2 over an interval, over the RMS of its part of degree 2 (Legendre polynomials).
+#: Ratio of the RMS of t^2, with t from the start of an interval, to the RMS of its Legendre component of degree 2.
 BEND = 6.0
 #: Time before a window at which the prediction of a model with latent states begins, s.
 LEAD = 0.15
-#: Tolerance of predictions, in standard deviations of a position.
+#: Tolerance of predictions, in standard deviations of a measured position.
 ACCURACY = 0.1
 #: Step of finite differences for a parameter's sensitivity, in standard deviations of its prior, and at most this part of its value.
 STEP_SIGMA, STEP_PART = 0.2, 0.02
-#: Part of a log, from its beginning, that a diagnosis fits to; it judges on the rest.
+#: Part of a log, from its beginning, that a diagnosis fits models to; the rest is the holdout.
 TRAINED = 0.6
 #: Widths of the smoothed sign of friction that a diagnosis may choose, in RMS speeds of the motion.
 SMOOTHED = (0.01, 0.05)
@@ -53,6 +53,7 @@ SMOOTHED = (0.01, 0.05)
 _STEPS = 8
 #: Decrease of the cost by a Gauss-Newton step, as a part of the cost before, below which the fit of a rival has converged.
 SETTLED = 0.02
+#: Effects that act on the encoders' readings.
 _MEASURED = ("encoder_offset", "encoder_eccentricity")
 
 
@@ -63,7 +64,7 @@ class Setting:
     Attributes
     ----------
     model : Hypothesis
-        The best model of a diagnosis.
+        Best model of a diagnosis: its re-estimated model with causes.
     horizon : float
         Length of a window [s].
     sigma : ndarray, shape (n_joints,)
@@ -73,7 +74,7 @@ class Setting:
     discrepancy : ndarray, shape (n_joints,)
         RMS error of predictions that the best model leaves beyond the noise floor [rad or m].
     excess : float
-        Cost of the best model's predictions above the floor, over the floor's.
+        Mean square prediction error of the best model beyond the noise floor's, over the floor's; mean over the joints.
     """
 
     model: Hypothesis
@@ -116,9 +117,9 @@ class HypothesisPair:
     alternatives : tuple of (weight, effects)
         Models with the effect in question, of several sizes; the weights add up to one.
     rival : tuple of EffectInstance
-        Effects of the rival's model.
+        Effects of the rival, the model without the effect in question.
     free : EffectInstance, optional
-        Effect of the rival with fitted values.
+        Effect of the rival whose values are fitted; None for a rival without such an effect.
     """
 
     alternatives: tuple[tuple[float, tuple[EffectInstance, ...]], ...]
@@ -136,7 +137,7 @@ class PredictedMotion:
     motion : Motion
         Reference motion.
     most : int, optional
-        Windows that are predicted, spread evenly; evidence is scaled to all windows.
+        Largest number of windows that are predicted, spread evenly; evidence is scaled to all windows. By default all are.
     """
 
     def __init__(self, setting: Setting, motion: Motion, most: int | None = None) -> None:
@@ -154,7 +155,7 @@ class PredictedMotion:
         length = every * self._samples + 1
         self.t: Array = h * np.arange(length, dtype=np.float64)
         self.q, self.dq, self.ddq = motion.at(self.t)
-        # A torque is held over a step: that of the step's middle.
+        # A torque is held over a step; it is the one that the motion needs at the step's middle.
         held = motion.at(self.t + 0.5 * h)
         self.tau = inverse_dynamics(setting.model, *held)
         self.held = held
@@ -167,10 +168,10 @@ class PredictedMotion:
         self._columns: Array | None = None
 
     def _weights(self) -> tuple[Array, Array]:
-        """Return the inverse standard deviations of a window's polynomials: by white noise, and in total; shape (n_windows, n_degrees, n_joints).
+        """Return inverse standard deviations of the polynomial coefficients, by white noise and in total, by window, degree and joint, flattened.
 
-        An encoder's rounding stays the same until the joint has moved by a step. The discrepancy is that of a torque that changes from window
-        to window: its positions fall with the square of the degree.
+        An encoder's rounding error is constant until the joint has moved by a step. The discrepancy is modelled as a torque that changes from
+        window to window: its part of a coefficient falls with the square of the degree.
         """
         setting, n = self._setting, self._samples + 1
         period = self._arm.sample_period
@@ -274,13 +275,13 @@ class PredictedMotion:
                 - self.predicted(model.theta, model.effects, lead)
             )
         late = [EffectInstance("actuator_delay", j + 1, {"delay": arm.sample_period}) for j in range(arm.n_joints)]
-        with suppress(ValueError):  # more effects than the simulator carries: the delay is one of them, as a rule
+        with suppress(ValueError):  # the model has as many effects as the simulator carries, as a rule with a delay
             delayed = self.predicted(model.theta, (*model.effects, *late), True)
             columns.append(delayed - self.predicted(model.theta, model.effects, True))
         return columns
 
     def outcome(self, pair: HypothesisPair, steps: int = _STEPS) -> Outcome:
-        """Return the evidence that a motion is expected to give between two models; zero where either cannot be simulated along it.
+        """Return the evidence that the motion is expected to give between two models; zero if one of them cannot be simulated along it.
 
         Parameters
         ----------
@@ -317,7 +318,7 @@ class PredictedMotion:
         return self._difference(pair.alternatives[0][1], pair)[0]
 
     def left_of(self, delta: Array, column: Array | None = None) -> tuple[float, float]:
-        """Return the square of a difference that the arm's parameters leave, and the coefficient of a further column fitted with them."""
+        """Return the squared rest of a difference after a fit of the values common to all models, and the coefficient of `column`, if fitted too."""
         free = np.empty((len(delta), 0)) if column is None else column[:, None]
         found = Columns(self.sensitivities(), free, (), len(self._arm.sigma)).fitted(delta, self._whole)
         return found.square, 0.0 if column is None else float(found.values[-1])
@@ -342,7 +343,7 @@ class PredictedMotion:
         best = columns.fitted(delta, self._whole * trained)
         plain = 0.5 * float(np.sum((delta * self._whole) ** 2))
         for _ in range(steps):
-            # Gauss-Newton: the rival predicts with the fitted values, and what is left is fitted again.
+            # Gauss-Newton: the rival predicts with the fitted values, and the remaining difference is fitted again.
             moved, rival = self._moved(pair, columns, best.values)
             try:
                 missed = truth - self.predicted(moved, rival, lead)
@@ -362,7 +363,7 @@ class PredictedMotion:
         windows = 0.5 * np.sum(beyond.reshape(self._count, -1) ** 2, axis=1)
         share = self._share
         above = share * min(float(np.sum(windows[first])) / TRAINED, float(np.sum(windows[~first])) / (1.0 - TRAINED))
-        # Robust weights let a window's cost grow with the logarithm only.
+        # With robust weights a window's cost grows with the logarithm of its squared residuals only.
         advantage = residuals * np.log1p(windows / residuals)
         certain = min(certainty(advantage, share), CERTAIN / HELD_CERTAIN * certainty(advantage[~first], share))
         return share * float(np.sum(left[first])) + prior, plain, above, certain, prior
@@ -370,7 +371,7 @@ class PredictedMotion:
     def _moved(
         self, pair: HypothesisPair, columns: Columns, values: Array
     ) -> tuple[tuple[float, ...], tuple[EffectInstance, ...]]:
-        """Return the rival's model with fitted values added; friction and inertia stay positive."""
+        """Return parameters and effects of the rival with fitted changes added; positive parameters of the arm stay positive."""
         arm, theta = self._arm, np.array(self._setting.model.theta)
         p = len(theta)
         changed = theta + arm.sigma * values[:p]
@@ -402,10 +403,10 @@ class PredictedMotion:
         return tuple(names), np.column_stack(columns)
 
 
-#: Parameters of an effect that state its location, not its size.
+#: Parameters of an effect that state where it acts, not its size, and are not fitted.
 _FIXED = ("riding", "encoder_at_motor", "friction_at_motor", "rotor_rides")
 
 
 def latent(effects: Sequence[EffectInstance]) -> bool:
-    """Whether one of the effects has a state that no encoder shows."""
+    """Return whether one of the effects has a latent state, one that no encoder shows."""
     return any(e.effect in LATENT for e in effects)

@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 LATENT = ("joint_elasticity", "backlash", "presliding", "actuator_lag", "actuator_delay")
 #: Effects that limit the torque, or whose torque has no bound, so that inverse dynamics fail.
 UNREACHABLE = ("contact", "torque_saturation")
-#: Simulated time from which an acceleration is computed, s.
+#: Length of the simulation whose change of velocity gives an acceleration, s.
 INSTANT = 1e-5
 #: Speed below which a joint may stick, rad/s or m/s.
 MOVING = 1e-3
@@ -44,7 +44,7 @@ def accelerations(model: Hypothesis, q: Array, dq: Array, tau: Array, t: Array) 
 def inverse_dynamics(model: Hypothesis, q: Array, dq: Array, ddq: Array) -> Array:
     """Return the torques of a motion for the arm without effects, dry friction included [N m or N]; shape of `q`.
 
-    The torque is the inertia matrix times the difference to the accelerations without torque and friction, plus friction.
+    The torque is the inertia matrix times the difference of `ddq` from the accelerations without torque and friction, plus friction.
     """
     arm = model.arm
     b, n = arm.n_inertial, arm.n_joints
@@ -60,7 +60,7 @@ def torque_with(
 ) -> Array:
     """Return the torques of a motion with effects added to a model, to first order from torques `tau` without them; shape of `tau`.
 
-    Effects with latent states, and those that no torque overcomes, are left out; so are instants at which a joint hardly moves.
+    Effects in `LATENT` and `UNREACHABLE` are left out; at instants at which a joint is slower than `MOVING`, `tau` is returned.
     """
     changed = tuple(e for e in effects if e.effect not in (*LATENT, *UNREACHABLE))
     if not changed:

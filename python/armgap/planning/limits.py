@@ -16,15 +16,15 @@ __all__ = ["PlanLimits", "limits_of"]
 
 Array = NDArray[np.float64]
 
-#: Part of a limit that a reference motion may use: the arm overshoots the reference, with a slow drive by a tenth.
+#: Part of a limit that a reference motion may use, as the arm overshoots its reference, by a tenth if the drive is slow.
 MARGIN = 0.92
-#: Part of the torque limit that the feed-forward may use under the best model; the rest is the controller's.
+#: Part of the torque limit that the feed-forward torque may use under the best model; the rest is left to the controller.
 TORQUE_MARGIN = 0.8
-#: Part of the torque limit that the feed-forward may use under every model in question.
+#: Part of the torque limit that the feed-forward torque may use under every model with an effect in question.
 TORQUE_MOST = 0.95
-#: Samples on either side of a local cubic from which the logs' accelerations are estimated.
+#: Half width, in samples, of the local cubics by which the logs' accelerations are estimated.
 _HALF_WIDTH = 10
-#: Quantile of the logs' accelerations that is taken as their largest: estimates scatter.
+#: Quantile of the logs' estimated accelerations that is taken as their largest, as the estimates scatter.
 COVERED = 0.995
 _REMEDY = "add a [limits] table with position_min, position_max, speed and acceleration"
 
@@ -51,7 +51,7 @@ class PlanLimits:
     home: Array
 
     def inner(self) -> MotionLimits:
-        """Limits reduced by a margin, to which a reference motion keeps."""
+        """Return the limits of a reference motion: those of the planned motion reduced to the part `MARGIN`."""
         m = self.motion
         middle, half = 0.5 * (m.position_min + m.position_max), 0.5 * MARGIN * (m.position_max - m.position_min)
         low, high = np.minimum(middle - half, self.home), np.maximum(middle + half, self.home)
@@ -87,7 +87,7 @@ def limits_of(arm: Arm, data: dict[str, Any]) -> PlanLimits:
 
 
 def _covered(arm: Arm, data: dict[str, Any]) -> MotionLimits:
-    """Return the range of the diagnosed logs as limits: positions and speeds from the diagnosis' map, accelerations from measured curves."""
+    """Return the range of the diagnosed logs as limits: positions and speeds from its regimes, accelerations from its curves."""
     columns = [_joint_covered(arm, data, j) for j in range(1, arm.n_joints + 1)]
     low, high, speed, acceleration = (np.array(column) for column in zip(*columns, strict=True))
     return MotionLimits(low, high, speed, acceleration)
@@ -110,7 +110,7 @@ def _joint_covered(arm: Arm, data: dict[str, Any], joint: int) -> tuple[float, f
 
 
 def _acceleration(curve: dict[str, Any]) -> Array:
-    """Return accelerations [rad/s^2 or m/s^2] of a measured curve, stretch by stretch."""
+    """Return the accelerations [rad/s^2 or m/s^2] of a measured curve of positions, from each stretch without gaps."""
     t, q = (np.asarray(curve[key], dtype=np.float64) for key in ("t", "measured"))
     gaps = np.flatnonzero(np.diff(t) > 1.5 * np.median(np.diff(t))) + 1
     found = []

@@ -1,9 +1,8 @@
 """Reference motions: fifth-order moves between two poses, around each of which every joint oscillates at two frequencies.
 
-A motion begins and ends at rest at home, moves to a first pose, oscillates around it, goes on to a second pose, oscillates there, and
-returns. Slow reversals, fast oscillations and large travel are special cases. Every number between 0 and 1 gives a motion within the limits:
-poses lie within the range of positions, moves take as long as speed and acceleration ask for, oscillations are scaled down to what
-is left.
+A motion begins and ends at rest at a home pose, moves to a first pose, oscillates around it, moves to a second pose, oscillates there, and
+returns. Slow reversals, fast oscillations and large travel are special cases. All design variables between 0 and 1 give motions within the
+limits: poses lie within the range of positions, moves take as long as speed and acceleration require, and oscillations are scaled down.
 """
 
 from __future__ import annotations
@@ -33,15 +32,15 @@ SHORTEST_MOVE = 0.2
 BLEND_SPEED, BLEND_ACCELERATION = 1.875, 10.0 / math.sqrt(3.0)
 #: Smallest amplitude of an oscillation, as a part of the largest that the limits allow.
 SMALLEST = 0.01
-#: Highest frequency of oscillations: this many times that at which speed and acceleration limit the amplitude equally; within these bounds, Hz.
+#: Highest frequency of oscillations, as a multiple of that at which speed and acceleration limit amplitudes equally, and its two bounds, Hz.
 OVERTONE, HIGHEST, LEAST_HIGHEST = 4.0, 10.0, 1.0
-#: Samples per period of an oscillation at the highest frequency, at least.
+#: Smallest number of samples per period of an oscillation.
 SAMPLES_PER_PERIOD = 20
 #: Golden angle, by which phases of joints and oscillations are spread so that they are not in step, rad.
 GOLDEN = math.pi * (3.0 - math.sqrt(5.0))
-#: Time over which an oscillation fades in or out: this part of a phase, at most so long, s.
+#: Time over which an oscillation fades in or out, as a part of the length of its phase, and largest such time, s.
 FADE_PART, FADE = 0.2, 0.6
-#: Points per second at which oscillations are compared with their limits.
+#: Points per second at which a motion is compared with the limits.
 LOOK_HZ = 200.0
 
 
@@ -54,13 +53,13 @@ class Motion:
     home : ndarray, shape (n_joints,)
         Pose at the beginning and the end [rad or m].
     times : tuple of float
-        Begin and end of the three moves, six instants [s].
+        Beginning and end of each of the three moves: six instants [s].
     duration : float
         Length of the motion [s].
     centres : ndarray, shape (2, n_joints)
         Poses of the two phases [rad or m].
     amplitude, frequency : ndarray, shape (2, n_joints, 2)
-        Oscillations of the two phases [rad or m, Hz].
+        Amplitude [rad or m] and frequency [Hz] of the two oscillations of each joint in the two phases.
     scale : float
         Factor of all deviations from home, 0 to 1.
     """
@@ -94,12 +93,12 @@ class Motion:
         return self.home + self.scale * (q - self.home), self.scale * dq, self.scale * ddq
 
     def scaled(self, factor: float) -> Motion:
-        """Return the motion with all deviations from home scaled, 0 to 1; it stays within the limits."""
+        """Return the motion with all deviations from the home pose multiplied by `factor`, 0 to 1; the limits still hold."""
         return replace(self, scale=self.scale * factor)
 
 
 def count(n_joints: int) -> int:
-    """Return the number of design variables of a reference motion."""
+    """Return the number of design variables of a reference motion of an arm with `n_joints` joints."""
     return PER_JOINT * n_joints + 1
 
 
@@ -146,7 +145,7 @@ def build(numbers: Array, home: Array, limits: MotionLimits, duration: float, pe
         peaks = [np.max(np.abs(x), axis=0) for x in oscillation(tau, lengths[i], wanted, frequency[i])]
         allowed = (room, limits.speed, limits.acceleration)
         ratio = [a / np.maximum(p, 1e-12) for a, p in zip(allowed, peaks, strict=True)]
-        # Between two looks a peak may be higher by a hundredth.
+        # Between two of the compared points a peak may be higher by a hundredth.
         amplitude[i] = wanted * np.minimum(1.0, 0.99 * np.min(ratio, axis=0))[:, None]
     return Motion(home, tuple(float(x) for x in instants), duration, centres, amplitude, frequency)
 
@@ -158,7 +157,7 @@ def highest_frequency(limits: MotionLimits, period: float) -> Array:
 
 
 def _moves(home: Array, centres: Array, limits: MotionLimits) -> list[float]:
-    """Return the shortest times of the three moves [s], all joints together."""
+    """Return the shortest times [s] of the three moves, in each of which all joints move for the same time."""
     poses = [home, *centres, home]
     times = []
     for before, after in pairwise(poses):
@@ -179,7 +178,7 @@ def oscillation(tau: Array, length: float, amplitude: Array, frequency: Array) -
     length : float
         Length of the phase [s].
     amplitude, frequency : ndarray, shape (n_joints, 2)
-        Amplitudes and frequencies of the two oscillations [rad or m, Hz].
+        Amplitudes [rad or m] and frequencies [Hz] of the two oscillations of each joint.
     """
     n = len(amplitude)
     fade = min(FADE, FADE_PART * length)
@@ -203,7 +202,7 @@ def _blend(x: Array) -> tuple[Array, Array, Array]:
     return x**3 * (10 - 15 * x + 6 * x * x), 30 * x * x * (1 - x) ** 2, 60 * x * (1 - x) * (1 - 2 * x)
 
 
-#: Slow frequencies and small amplitudes of the initial motions of a search, as parts of their ranges.
+#: Design variables, 0 to 1, for a slow frequency and for a small amplitude in the usual motions.
 _SLOW, _SMALL = 0.15, 0.4
 _PATTERNS: dict[str, tuple[tuple[float, float, float, float], tuple[float, float, float, float]]] = {
     "slow reversals": ((_SMALL, 0.35, 0.5, 0.5), (0.7, _SLOW, _SMALL, 0.4)),
@@ -214,7 +213,7 @@ _PATTERNS: dict[str, tuple[tuple[float, float, float, float], tuple[float, float
 
 
 def named(name: str, n_joints: int, poses: tuple[float, float] = (0.5, 0.5)) -> Array:
-    """Return the design variables of a usual motion.
+    """Return the design variables of one of the four usual motions, with which a search begins.
 
     Parameters
     ----------

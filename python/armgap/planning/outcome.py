@@ -21,9 +21,9 @@ HELD_CERTAIN = 1.0
 TRUST_SIGMAS = 4.0
 #: Standard deviations of evidence above a decision's threshold from which more evidence does not count in the search.
 _ENOUGH = 3.0
-#: Evidence that the search aims at, as a multiple of sufficient evidence: the effect may be smaller than assumed.
+#: Evidence that the search for a motion aims at, as a multiple of sufficient evidence, as an effect may be smaller than assumed.
 AIM = 100.0
-#: Growth of a logarithmic merit over its range: the smaller, the more the weakest condition counts.
+#: Constant `G` of a motion's merit ``log(1 + G x)/log(1 + G)`` for evidence `x`, 0 to 1: the smaller, the more the weakest condition counts.
 _GROWTH = 1e4
 
 
@@ -39,7 +39,7 @@ class Outcome(NamedTuple):
         Cost of the fitted rival above the noise, over the threshold of a diagnosis; the smaller of the values for training and holdout
         windows.
     certain : ndarray
-        Mean advantage of a window, in standard errors; less where holdout windows have less than their part.
+        Mean advantage of a window, in standard errors; less if the holdout windows alone do not reach their threshold.
     prior : ndarray
         Part of `fitted` from the prior: the rival needs implausible parameters of the arm.
     weight : ndarray
@@ -94,7 +94,7 @@ def settled(expected: float, threshold: float) -> float:
 
 
 def _normal(x: float) -> float:
-    """Return the standard normal distribution function."""
+    """Return the standard normal distribution function at `x`."""
     return 0.5 * math.erfc(-x / math.sqrt(2.0))
 
 

@@ -22,7 +22,7 @@ __all__ = ["lines", "plan_document", "plan_summary"]
 
 #: Probability of a decision from which a question counts as one that the motion settles.
 SURE = 0.9
-#: Points of a curve in a plan's report that are drawn at most.
+#: Number of points to which a long curve in a plan's report is thinned out, roughly.
 DRAWN = 2000
 _COLOURS = (charts.BEFORE, charts.AFTER, charts.FLOOR, charts.REFIT, charts.MEASURED)
 _ORIGINS = {
@@ -56,7 +56,7 @@ def lead(plan: Plan) -> str:
 
 
 def answers(plan: Plan) -> list[SummaryAnswer]:
-    """Return the purpose of a plan, the expected certainty, and the questions that it leaves open, as answers."""
+    """Return the summary answers of a plan's report: purpose, expected certainty, and questions that may stay open."""
     best = sorted(plan.questions, key=lambda q: -q.settled)
     settled = [f"{_short(q)}: {percent(q.settled)}" for q in best]
     unsettled = [q for q in best if q.why]
@@ -88,7 +88,7 @@ def lines(plan: Plan) -> list[str]:
 
 
 def _asked(q: PlannedQuestion) -> str:
-    """Return a question of a plan in words."""
+    """Return a question of a plan in words, as ``backlash (joint 2) or none?``."""
     other = "none" if q.against == NONE else f"{title(q.against)} ({joint_text(q.against_joint)})"
     return f"{_short(q)} or {other}?"
 

@@ -1,4 +1,4 @@
-"""`plan`: plans the next experiment from a diagnosis."""
+"""The function `plan`, which plans the next experiment from a diagnosis, and its result `Plan`."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ __all__ = ["Plan", "PlannedQuestion", "plan"]
 
 Array = NDArray[np.float64]
 
-#: Questions that a motion is planned for by default, at most.
+#: Largest number of questions that a motion is planned for by default.
 MOST_QUESTIONS = 5
 #: Log-likelihood ratio that a decision needs, in addition to the logarithm of the number of candidates.
 DECISION = 3.0
@@ -47,9 +47,9 @@ SHORTEST, LONGEST = 2.0, 120.0
 NEXT_TO_NOTHING = 1.0
 #: Part of the difference between two models, left after the rival is fitted, below which the models are equivalent.
 SAME = 1e-3
-#: Part of the difference between two models with all values fitted below which they are identical: rounding and the last step leave as much.
+#: Part of the difference between two models, left by a fit of all values, below which they are identical: rounding and the last step leave as much.
 IDENTICAL = 1e-5
-#: Number of effects for which it is tried how well they imitate an effect in question.
+#: Largest number of effects that are tried as imitations of an effect in question.
 _TRIED = 8
 SCHEMA = "armgap.plan/1"
 
@@ -63,11 +63,11 @@ class PlannedQuestion:
     effect, joint : str, int or None
         The effect in question.
     against, against_joint : str, int or None
-        Effect to be distinguished from `effect`; ``"none"`` for its absence.
+        Rival effect and its joint; ``"none"`` for the absence of `effect`.
     expected_log_likelihood_ratio : float
-        Expected ratio if the effect is in the arm, mean over its sizes.
+        Expected log-likelihood ratio of effect and rival if the effect is in the arm, mean over the effect's sizes.
     settled : float
-        Probability that the log-likelihood ratio exceeds a decision's threshold, mean over its sizes.
+        Probability that a diagnosis of the motion's log decides the question if the effect is in the arm, mean over its sizes.
     origin : {"asked", "equivalents", "candidate", "undecided", "not excited"}
         Reason why the question is open.
     sizes : (str, float, float), optional
@@ -121,13 +121,13 @@ class Plan:
     questions : tuple of PlannedQuestion
         Questions that the motion is planned for.
     left_out : tuple of str
-        Other open questions, as ``effect:joint against rival``.
+        Open questions that the motion is not planned for, as ``effect:joint against rival``.
     limits : PlanLimits
         Limits of the motion.
     threshold : float
         Log-likelihood ratio that a decision needs.
     evaluations : int
-        Number of motions compared.
+        Number of motions compared in the search.
     notes : tuple of str
         Remarks on the plan.
     """
@@ -191,7 +191,7 @@ class Plan:
         Raises
         ------
         ResultError
-            If the ending is another, or the file cannot be written.
+            If the name has another ending, or the file cannot be written.
         """
         check_output(path)
         table = self.to_polars()
@@ -211,7 +211,7 @@ _PARQUET = (".parquet", ".pq")
 
 
 def check_output(path: str | os.PathLike[str]) -> None:
-    """Raise if a motion cannot be written to a path."""
+    """Raise an error if the ending of a path names no format in which a motion can be written."""
     if os.fspath(path) != STANDARD_STREAM and Path(path).suffix.lower() not in (*_PARQUET, ".csv"):
         raise ResultError("has an unknown ending", remedy="write .csv or .parquet", file=path)
 
@@ -245,7 +245,7 @@ def plan(
     seed : int, default 1
         Seed of the search; equal seeds give equal motions.
     progress : callable, optional
-        As for `armgap.diagnose`.
+        Function that is called with the name of the work and the fraction that is done, 0 to 1, as for `armgap.diagnose`.
 
     Returns
     -------
@@ -269,7 +269,7 @@ def plan(
 
 
 def check_optimiser() -> None:
-    """Raise if the package for differential evolution is not installed."""
+    """Raise an error if scipy, the package for differential evolution, is not installed."""
     from importlib.util import find_spec
 
     if find_spec("scipy") is None:
@@ -365,7 +365,7 @@ def _plan(data: dict[str, Any], arm: Arm, wanted: Sequence[str], duration: float
 def _against_look_alikes(
     builder: HypothesisBuilder, chosen: Sequence[TestedQuestion], usual: PredictedMotion, remarks: list[str]
 ) -> list[TestedQuestion]:
-    """Return questions of each chosen effect against effects that imitate it, for the case that the effect is present."""
+    """Return questions of each chosen effect, asked against its absence, against effects that imitate it; add remarks on identical ones."""
     known = {frozenset((p.question.place, p.question.rival)) for p in chosen}
     unseen = [p for p in chosen if p.question.against == NONE]
     likely = [q for p in unseen for q in builder.look_alikes(p)[:_TRIED]]

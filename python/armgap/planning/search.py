@@ -24,20 +24,21 @@ __all__ = ["Found", "Search", "standard"]
 
 Array = NDArray[np.float64]
 
-#: Population of differential evolution, and generations after the first.
+#: Number of motions in a generation of differential evolution, and number of generations after the first.
 POPULATION, GENERATIONS = 16, 9
-#: Windows on which motions are compared, and finalists, which are compared on all windows.
+#: Largest number of windows on which motions are compared, and number of best motions that are compared again on all windows.
 _WINDOWS, FINALISTS = 20, 4
-#: Steps in which a motion is scaled down until its torques are within limits, at most.
+#: Largest number of steps in which a motion is scaled down until its torques are within limits and it is free of collision.
 _SHRINKS = 12
 #: Factor per step by which a motion with a collision is scaled down.
 _SHRINK = 0.8
-#: Torques are checked at every so many prediction steps while a motion is scaled down.
+#: Interval, in prediction steps, at which torques are checked while a motion is scaled down.
 COARSE = 4
-#: Poses per joint at which the torque left for accelerations is computed, and smallest part of the limit that counts as left.
+#: Number of poses per joint at which the torque left for accelerations is computed, and smallest value assumed for it, as a part of the limit.
 _POSES_PER_JOINT, LEFT = 5, 0.1
 #: Part of the torque left for accelerations that a joint's own acceleration takes; the rest is for the other joints' accelerations.
 COUPLED = 0.6
+#: Usual motions with which a search begins, and pairs of poses at which they oscillate, from 0 to 1 of each joint's range.
 _SEEDS = ("slow, then fast", "large travel", "fast multisine", "slow reversals")
 _POSES = ((0.5, 0.5), (0.3, 0.7), (0.8, 0.35))
 
@@ -49,11 +50,11 @@ class Found:
     Attributes
     ----------
     motion : Motion
-        Motion with the most evidence.
+        Motion with the most expected evidence for all questions.
     evaluations : int
         Number of motions tried.
     most : ndarray, shape (n_questions,)
-        Largest evidence of any motion tried, per question.
+        Largest expected log-likelihood ratio of any motion tried, per question.
     """
 
     motion: Motion
@@ -87,7 +88,7 @@ class Search:
         self._inner = self._reachable(limits.inner())
 
     def _check_home(self) -> None:
-        """Raise if the arm cannot be held at the home pose, or collides with something in it."""
+        """Raise an error if the arm collides with itself or a box at the home pose, or its torques cannot hold it there."""
         space = self._limits.motion.space
         if space is not None and (pair := space.touched(self._limits.home)) is not None:
             raise OptionError(
@@ -105,7 +106,7 @@ class Search:
             )
 
     def _reachable(self, inner: MotionLimits) -> MotionLimits:
-        """Return limits with accelerations reduced to those that the torque left by gravity and friction allows, roughly."""
+        """Return limits with accelerations reduced to an estimate of those possible with the torque that gravity and friction leave."""
         if self._limits.torque is None:
             return inner
         arm, model = self._setting.arm, self._setting.model
@@ -174,11 +175,11 @@ class Search:
         return motion
 
     def play(self, motion: Motion) -> PredictedMotion:
-        """Return a motion with its torques and predictions."""
+        """Return a motion with the torques that it needs and the predictions of models along it."""
         return PredictedMotion(self._setting, motion)
 
     def best(self, tested: Sequence[TestedQuestion], threshold: float, seed: int) -> Found:
-        """Return the best motion found for some questions; equal seeds give equal motions."""
+        """Return the motion with the most expected evidence that a search finds for some questions; equal seeds give equal motions."""
         from scipy.optimize import differential_evolution
 
         state = _State(np.zeros(len(tested)))
@@ -203,7 +204,7 @@ class Search:
         return Found(self._final(state, tested, threshold), state.count, state.most)
 
     def _final(self, state: _State, tested: Sequence[TestedQuestion], threshold: float) -> Motion:
-        """Return the best of the finalists, judged by all sizes and windows, with the rival fully fitted."""
+        """Return the best of the search's best motions, compared again by all sizes and windows and with the rival fully fitted."""
         motions = [self.kept(motion, tested) for _, _, motion in state.best]
         every = [[self.play(motion).outcome(p.pair) for p in tested] for motion in motions]
         sure = [sum(x.settled(threshold) for x in outcomes) / len(tested) for outcomes in every]
@@ -222,7 +223,7 @@ class Search:
 
 @dataclass
 class _State:
-    """State of a search: motions tried so far, with their worth."""
+    """State of a search: largest evidence per question, number of motions tried, and best motions, each with its worth and number."""
 
     most: Array
     count: int = 0
@@ -230,6 +231,6 @@ class _State:
 
 
 def _worth(outcomes: Sequence[Outcome], threshold: float) -> float:
-    """Return the worth of a motion for several questions, from 0 to 1; the least settled question counts as much as the mean."""
+    """Return the worth of a motion for several questions, from 0 to 1; the least settled question counts as much as the mean of all."""
     merits = [x.merit(threshold) for x in outcomes]
     return 0.5 * (float(np.mean(merits)) + min(merits))

@@ -1,4 +1,4 @@
-"""Answer of a method to a case of a trial: named causes with probabilities and sizes, bounds, the gap, and the time it took.
+"""Answer of a method to a case of a trial: named causes with probabilities and sizes, bounds, the gap, and the CPU time.
 
 All methods give answers in one form and are scored by one set of rules. On disk an answer is one JSON file
 per case, schema ``armgap.answer/1``.
@@ -15,6 +15,7 @@ from armgap.diagnosis.result import GapAtHorizon
 from armgap.errors import OptionError
 
 SCHEMA = "armgap.answer/1"
+#: Name of an effect, and its joint from 1; None for the whole arm.
 Name = tuple[str, int | None]
 
 
@@ -35,9 +36,9 @@ class NamedCause:
     effect, joint
         Standard name of the effect; joint from 1, None for the whole arm.
     probability : float
-        Probability by the method itself, 0 to 1.
+        Probability that the method states for the cause, 0 to 1.
     sizes : dict of str to Size
-        Estimated parameters, if the method gives any.
+        Estimated parameters of the effect by name, if the method gives any.
     look_alikes : tuple of (effect, joint)
         Effects that the method states as indistinguishable from the cause.
     """
@@ -56,7 +57,7 @@ class NamedCause:
 
 @dataclass(frozen=True)
 class AbsentEffect:
-    """An effect that a method calls absent, with `value` as upper 95 % bound of its size."""
+    """An effect that a method calls absent, with `value` as upper 95 % bound of its size, the parameter `parameter` [SI]."""
 
     effect: str
     joint: int | None
@@ -73,25 +74,25 @@ class Answer:
     method : str
         Name of the method.
     verdict : str
-        ``"none"``, ``"parameters"``, ``"effect"`` or ``"unexplained"``.
+        Verdict: ``"none"``, ``"parameters"``, ``"effect"`` or ``"unexplained"``.
     causes : tuple of NamedCause
         Named causes, the most probable first.
     limits : tuple of AbsentEffect
         Effects that the method calls absent, with bounds.
     reach : GapAtHorizon, optional
-        RMS prediction errors, if the method predicts.
+        RMS prediction errors of the method's models, if it predicts.
     theta : tuple of float
         Parameters of the arm in the model with causes, in the arm file's order, if the method gives them.
     place : int, optional
-        Joint with most of the gap, if the method names one.
+        Joint (from 1) with most of the gap, if the method names one.
     error : str, optional
-        Reason of a missing answer.
+        Reason why the method gave no answer.
     remark : str
-        Remark of the method.
+        Remark of the method on its answer, in words.
     seconds : float
-        CPU time of one thread [s].
+        CPU time of the method for the case, in one thread [s].
     seal, version : str
-        Hash that the case states for its key; version of the software that answered.
+        SHA-256 by which the case seals its key; version of the software that answered.
     """
 
     method: str
@@ -138,7 +139,7 @@ class Answer:
 
 
 def read_answer(path: Path) -> Answer:
-    """Read an answer from its file.
+    """Read a method's answer to a case from its JSON file.
 
     Raises
     ------

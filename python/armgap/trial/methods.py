@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = ["ARMGAP", "Method", "methods"]
 
-HORIZON = 0.25  # s
+HORIZON = 0.25  # horizon of the windows by which methods fit and predict, s
 
 
 @cache
@@ -36,17 +36,17 @@ class Method:
     Attributes
     ----------
     name, title : str
-        Name for folders, and title for readers.
+        Name as in folders of answers, and title as in tables.
     settings : str
         Description and settings of the method, in one sentence or two.
     answer : callable
-        Answers a sealed case.
+        Function that returns the method's answer to a sealed case.
     version : callable
         Function that returns the version of the method's software; answers of another version are computed again.
     check : callable
         Function that raises if the method cannot run.
     expresses : frozenset of str, optional
-        Effects that the method can name, or their equivalents, if these are not all effects.
+        Effects that the method can name, with their equivalents; None for a method that can name all.
     """
 
     name: str

@@ -33,23 +33,23 @@ def answer_file(case: Path, method: str) -> Path:
 
 
 def open_cases(folder: str | Path, method: Method, again: bool = False) -> list[Path]:
-    """Return the folders of cases that a method has not answered yet."""
+    """Return the folders of the cases that a method has not answered yet; of all cases if `again`."""
     return [c for c in case_folders(folder) if again or not _answered(c, method)]
 
 
 def answer_cases(
     cases: list[Path], method: Method, *, workers: int = 1, limit_s: float = _LIMIT_S
 ) -> Iterator[tuple[Path, Answer]]:
-    """Let a method answer cases, in processes of one thread each; every answer is written at once.
+    """Let a method answer cases, in processes of one thread each; each answer is written as soon as it is given.
 
     Parameters
     ----------
     cases : list of Path
         Case folders.
     method : Method
-        One of `methods`.
+        Method that answers, one of `methods`.
     workers : int, default 1
-        Processes.
+        Number of processes.
     limit_s : float, default 300
         Longest time for one case [s]; a case that takes longer has an answer with an error.
 
@@ -72,7 +72,7 @@ def answer_cases(
 
 
 def _result(result: Callable[[], Answer], case: Path, method: Method, limit_s: float) -> Answer:
-    """Return the answer of a worker process, or an answer with the error."""
+    """Return the answer of a worker process; if it took too long or failed, an answer that states the error."""
     from pebble import ProcessExpired
 
     try:

@@ -21,7 +21,9 @@ FAMILIES = {"single": 0.65, "null": 0.08, "parameters": 0.07, "pair": 0.12, "out
 MACHINES = {"direct-drive": 0.45, "geared": 0.35, "pendulum": 0.12, "axis": 0.08}
 #: Seed of the trial cases that the diagnosis may be developed on; reported scores use fresh seeds.
 DEVELOPMENT_SEED = 1997
+#: All seeds whose trial cases were used in development.
 DEVELOPMENT_SEEDS = (11, DEVELOPMENT_SEED)
+#: Largest number of seeds tried for one case until one gives an acceptable motion.
 RETRIES = 10
 
 
@@ -36,9 +38,9 @@ class Plan:
     family : str
         Key of :data:`FAMILIES`.
     model : str
-        Kind of machine.
+        Kind of machine, a key of :data:`MACHINES`.
     effects : tuple of (name, joint)
-        Effects to hide.
+        Effects to hide, with joints from 1; None for an effect of the whole arm.
     nominal : {"exact", "off"}
         Whether the arm file's parameters are exact or off.
     duration : float
@@ -58,7 +60,7 @@ class Plan:
         Raises
         ------
         NoMotionError
-            No seed gave a motion.
+            No seed gave an acceptable motion.
         """
         for attempt in range(RETRIES):
             try:
@@ -72,17 +74,17 @@ class Plan:
 
 
 def fresh_seed() -> int:
-    """Return a random seed, outside the seeds used in development."""
+    """Return a random seed below 2^31 for a trial with cases that development has not used."""
     return secrets.randbelow(2**31)
 
 
 def plan_trial(seed: int, n_cases: int, families: Mapping[str, float] | None = None) -> list[Plan]:
-    """Return plans with the hidden effects of each case of a trial, in an order that reveals nothing.
+    """Return plans with the hidden effects of each case of a trial, in random order, so that numbers reveal nothing.
 
     Parameters
     ----------
     seed : int
-        :data:`DEVELOPMENT_SEED`, or :func:`fresh_seed` for a score.
+        Seed of the trial: :data:`DEVELOPMENT_SEED`, or one of :func:`fresh_seed` for a score to be reported.
     n_cases : int
         Number of cases.
     families : mapping of str to float, optional
@@ -125,7 +127,7 @@ def make_trial(
     duration : float, default 10
         Length of each log, s.
     workers : int, default 1
-        Processes.
+        Number of processes.
 
     Returns
     -------

@@ -24,11 +24,11 @@ class Judgement:
     exact : bool
         Whether the diagnosis is right without an equivalence.
     found : int
-        Number of hidden effects among all named causes.
+        Number of hidden effects that a named cause equals or is equivalent to.
     extra : int
-        Number of named causes that are not hidden.
+        Number of named causes that are neither hidden effects nor equivalent to one.
     named, hidden : str
-        Named causes and hidden effects in words.
+        Named causes and hidden effects, each with its joint, in words.
     """
 
     right: bool
@@ -57,7 +57,7 @@ def judge(diagnosis: Diagnosis, key: Key) -> Judgement:
 def equivalent(named: Name, hidden: Name) -> bool:
     """Return whether no log of motion distinguishes two effects: equivalents that hold for every log.
 
-    A hidden rotor that couples the joints is also a rotor: most of what it does is inertia on joint 2's own acceleration.
+    A hidden rotor coupling may be named as rotor inertia of joint 2: most of its torque is inertia times joint 2's own acceleration.
     """
     if named == hidden or (named, hidden) == (("rotor_inertia", 2), ("rotor_coupling", None)):
         return True

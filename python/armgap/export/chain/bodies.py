@@ -7,7 +7,7 @@ and Cortesao 2014). This is a convex problem::
 
     minimise  |Y (x - found)|^2 / 2 + |(x - nominal)/sigma|^2 / 2 - mu sum log det P_k(x)
 
-with torques `Y x` in units of a share of each joint's own, so small that torques stay where they can, and a barrier `mu` that goes to zero
+with torques `Y x` in units of a share of each joint's own, so small that torques stay if that is possible, and a barrier `mu` that goes to zero
 (Boyd and Vandenberghe 2004, section 11.3). Where no consistent links have these torques, the solution has the least torque error.
 """
 
@@ -24,35 +24,38 @@ __all__ = ["BODY_TOLERANCE", "Bodies", "nearest_bodies"]
 
 Array = NDArray[np.float64]
 
-#: Torque differences below this share of a joint's own torque count as none: the errors of an estimate are ten times larger and more.
+#: Torque differences below this share of a joint's own torque count as none: errors of an estimate are at least ten times larger.
 BODY_TOLERANCE = 1e-3
 #: Torque error, as a share of the joint's torque, that costs as much as one standard deviation of a parameter: where the torques can be
-#: kept, and where they cannot. In the second case a smaller share makes links absurd (rods of many times the mass) and torques hardly better.
+#: kept, and where they cannot. In the second case a smaller share gives implausible links (rods of many times the mass) and hardly better torques.
 _SHARES = (1e-5, 1e-3)
-#: Weights of the log-det barrier: from one that outweighs the torques to one that is small beside a tenth of a standard deviation.
+#: Weights of the log-det barrier: from one that outweighs the torques to one that is small compared with a tenth of a standard deviation.
 _BARRIERS = 10.0 ** np.arange(10.0, -3.0, -2.0)
+#: Largest number of Newton steps for one weight of the barrier.
 _MOST_STEPS = 60
 #: Newton decrement, in units of the barrier's weight, at which the minimum for this weight is reached.
 _REACHED = 1e-6
+#: Line search: smallest decrease of the cost, as a part of the predicted one, and smallest part of a Newton step that is tried.
 _SLOPE = 0.1
 _LEAST_PART = 1e-10
+#: Pseudo-inertia for each of the ten inertial parameters at the value 1 and the others at 0, shape (10, 4, 4).
 _UNIT_PSEUDO_INERTIAS = np.array([pseudo_inertia(unit) for unit in np.eye(10)])
 
 
 @dataclass(frozen=True)
 class Bodies:
-    """Physically consistent links, with the change of joint torques.
+    """Physically consistent links, and the change of joint torques from those of the estimated links.
 
     Attributes
     ----------
     inertial : ndarray, shape (n_joints, 10)
-        Ten inertial parameters of each link.
+        Ten inertial parameters of each link [SI].
     rotor : ndarray, shape (n_joints,)
-        Rotor inertias, none of them negative.
+        Rotor inertias reflected to the joints, none of them negative [kg m^2 or kg].
     changed : tuple of int
         Links, from 0, that were physically impossible as estimated; empty if no link was changed.
     torque_error : ndarray, shape (n_joints,)
-        RMS change of each joint's torque, as a share of the torque.
+        RMS change of each joint's torque, as a share of the joint's RMS torque.
     """
 
     inertial: Array
@@ -84,7 +87,7 @@ def nearest_bodies(
     """
     n = len(beside)
     links, rotors = found[: 10 * n].reshape(n, 10), found[10 * n :]
-    # Numbers of zero may hide a massless link: nothing that a simulator could integrate.
+    # A link without mass may pass the test of consistency, but a simulator cannot integrate its motion.
     wrong = tuple(k for k in range(n) if inconsistency(links[k] - beside[k]) or links[k][0] <= beside[k][0])
     if not wrong and np.all(rotors >= 0):
         return Bodies(links, rotors, (), np.zeros(n))
@@ -102,7 +105,7 @@ def nearest_bodies(
 def _minimised(found: Array, nominal: Array, sigma: Array, rows: Array, beside: Array) -> Array:
     """Return the consistent links' parameters that minimise ``|rows (x - found)|^2 + |(x - nominal)/sigma|^2``, by Newton's method with barriers."""
     n = len(beside)
-    # Rotors that are not there stay so.
+    # Rotor inertias of zero stay zero: the joint has no rotor.
     free = np.concatenate([np.ones(10 * n, dtype=bool), found[10 * n :] > 0])
     barrier = _Barrier(n, beside, np.flatnonzero(free[10 * n :]))
     x = _start(nominal, sigma, barrier)
@@ -128,7 +131,7 @@ def _minimised(found: Array, nominal: Array, sigma: Array, rows: Array, beside: 
             while part > _LEAST_PART and not cost(x + part * step, mu) <= here - _SLOPE * part * decrement:
                 part *= 0.5
             if part <= _LEAST_PART:
-                break  # rounding
+                break  # within rounding no part of the step decreases the cost
             x = x + part * step
     return x
 
@@ -157,7 +160,7 @@ class _Barrier:
         return -2.0 * float(np.log(diagonals).sum()) - float(np.log(x[self.rotors]).sum())
 
     def derivatives(self, x: Array) -> tuple[Array, Array]:
-        """Return gradient and Hessian of the barrier function."""
+        """Return gradient, shape (11 n,), and Hessian, shape (11 n, 11 n), of the barrier function."""
         gradient, hessian = np.zeros(len(x)), np.zeros((len(x), len(x)))
         for k, inverse in enumerate(np.linalg.inv(self.pseudo_inertias(x))):
             by = inverse @ _UNIT_PSEUDO_INERTIAS
@@ -170,7 +173,7 @@ class _Barrier:
 
 
 def _start(nominal: Array, sigma: Array, barrier: _Barrier) -> Array:
-    """Return the nominal values with balls added at the links' origins, so heavy that every link is physically consistent."""
+    """Return the nominal values with a ball added at each link's origin, so heavy that the link is physically consistent."""
     n, x = barrier.n, nominal.copy()
     x[barrier.rotors] = np.maximum(x[barrier.rotors], sigma[barrier.rotors])
     for k in range(n):

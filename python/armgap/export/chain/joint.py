@@ -30,13 +30,13 @@ class Joint:
     drag, cubic_drag : float
         Torques ``-drag dq |dq|`` and ``-cubic_drag dq^3``.
     offset, gain, delay, lag : float
-        Drive: torque ``gain u + offset`` with the command `u` delayed [s] and lagged [s].
+        Drive: torque ``gain u + offset`` [N m or N], with the command `u` delayed by `delay` [s] and lagged by `lag` [s].
     limit : float, optional
-        Largest command that gives more torque.
+        Command beyond which the torque no longer grows [N m or N]; None without a limit.
     reading : float
         Encoder reading at ``q = 0`` [rad or m].
     stop : (position, stiffness), optional
-        Spring beyond a position, on the side away from zero.
+        Position [rad or m] beyond which, on the side away from zero, a spring acts, and its stiffness [N m/rad or N/m].
     """
 
     viscous: float
@@ -62,7 +62,7 @@ class Joint:
         return np.array(given[: 3 if self.cubic_drag else 2 if self.drag else 1])
 
     def free(self, far: float) -> tuple[float, float, float] | None:
-        """Return the range of encoder readings within the stop, `far` on the side without one, and the stop's stiffness; None without a stop."""
+        """Return the encoder readings between which no stop acts, `far` on the side without one, and the stop's stiffness; None without a stop."""
         if self.stop is None:
             return None
         position, stiffness = self.stop
@@ -71,7 +71,7 @@ class Joint:
 
 
 def _spring(joint: Joint, p: Mapping[str, float]) -> Joint:
-    """Return the joint with one more spring; a hardening spring keeps its rest position, and the others' preload becomes an offset."""
+    """Return the joint with one more spring; a hardening spring's rest position is kept, and preload becomes a torque offset."""
     k, q0, cubic = p["k"], p["q0"], p.get("cubic", 0.0)
     stiffness, preload = joint.stiffness + k, joint.stiffness * joint.rest + k * q0
     if cubic or joint.cubic:

@@ -8,7 +8,7 @@ inertias and the length of link 1. With ``s2 = m2 lc2``, ``S = m1 lc1 + m2 l1`` 
     B      = I1 + s1^2/m1 + m2 l1^2            so  m2 < B/l1^2,  m1 > s1^2/J1,  with s1 = S - m2 l1,  J1 = B - m2 l1^2
 
 The interval of ``m2`` is not empty exactly if the inertia matrix is positive definite in every position, and any point of
-the interval gives the same motion. Masses of the arm file are taken if they lie inside. Otherwise ``m2`` is the middle of its interval,
+the interval gives the same motion. Masses of the arm file are taken if they lie inside it. Otherwise ``m2`` is the middle of its interval,
 where ``(m2 theta3 - s2^2)(B - m2 l1^2)`` is largest, which vanishes where either link becomes impossible; and
 ``m1 = s1^2/J1 + J1/l1^2``. Consistency in the sense of Wensing, Kim and Slotine (2018): positive masses, and moments of
 inertia about the centre of mass that a distribution of positive mass can have.
@@ -167,7 +167,7 @@ def _two_link(
 def _first_length(
     gravity: float, th2: float, th5: float, length: Sequence[float] | None
 ) -> tuple[float, tuple[str, ...]]:
-    """Return the length of link 1 [m] that theta2 and theta5 imply, or the stated one where they imply none, with notes."""
+    """Return the length of link 1 [m] that theta2 and theta5 imply, or the stated one if they imply none, and notes on the choice."""
     stated = length[0] if length else None
     moment = _moment(th5, gravity, "theta5")
     if gravity == 0 or (th2 == 0 and moment == 0):
@@ -192,7 +192,7 @@ def _ratio(a: float, b: float) -> str:
 
 
 def _moment(torque: float, gravity: float, name: str) -> float:
-    """Return the first moment of mass [kg m] that makes a gravity torque."""
+    """Return the first moment of mass [kg m] that causes the gravity torque `torque` [N m]."""
     if gravity > 0:
         return torque / gravity
     if torque != 0:

@@ -17,6 +17,7 @@ __all__ = ["SimulatorModel", "number", "numbers"]
 _TIME_STEP = 5e-4
 #: Decay rate by viscous friction, times the time step, up to which Runge-Kutta is used; the method is stable to 2.8 (Hairer 1993, section IV.2).
 _STABLE = 1.0
+#: Number of random poses at which the decay rate by viscous friction is computed.
 _POSES = 50
 
 
@@ -31,7 +32,7 @@ class SimulatorModel:
     chain : SerialChain
         Joints with their placements, limits of position, and gravity in the frame of the base.
     inertial : ndarray, shape (n_joints, 10)
-        Inertia of each link, see `armgap.arm.rigid_body`; physically consistent.
+        Ten inertial parameters of each link, see `armgap.arm.rigid_body` [SI]; physically consistent.
     joints : tuple of Joint
         Friction, springs, drive, encoder and stop of each joint.
     sample_period : float

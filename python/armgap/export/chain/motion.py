@@ -20,6 +20,7 @@ States = tuple[Array, Array, Array]
 _STATES = 400
 #: Half width of the local cubics that give velocities and accelerations [s]: that of the test functions of the diagnosis.
 _HALF_WIDTH_S = 0.05
+#: Smallest number of samples of a local cubic.
 _FEWEST = 7
 #: Standard deviations of speed [rad/s or m/s] and acceleration [rad/s^2 or m/s^2] of random states.
 _SPEED, _ACCELERATION = 1.0, 3.0
@@ -55,7 +56,7 @@ def diagnosed_states(diagnosis: Diagnosis, n: int) -> States | None:
 
 
 def any_states(arm: Arm) -> States:
-    """Return random states within the limits of position, or within a turn or a metre for a joint without limits."""
+    """Return random states of a serial arm: positions within the limits of each joint, but at most within half a turn or 0.5 m of zero."""
     chain, rng = arm.chain, np.random.default_rng(1)
     assert chain is not None
     reach = np.where(chain.rotary, math.pi, 0.5)

@@ -26,6 +26,7 @@ __all__ = ["CorrectedPlanar", "correct_planar"]
 
 Array = NDArray[np.float64]
 
+#: Axis of the rotary joints of planar arms in the frame of the base.
 _ACROSS = np.array([0.0, 1.0, 0.0])
 
 
@@ -87,7 +88,7 @@ class CorrectedPlanar(Corrected):
     def simulated(self, form: str) -> SimulatorModel:
         """Return the arm as a chain for MJCF or URDF: links hang down along -z and turn about y.
 
-        In URDF the rotor of joint 1 is part of its link, which makes no difference.
+        In URDF the rotor inertia of joint 1 is part of its link's inertia, which gives the same motion.
         """
         model = (self.uncoupled() or self) if form == "mjcf" else self
         links, joints, n = model.built(), model.joints, self.arm.n_joints
@@ -200,7 +201,7 @@ def _first_length(arm: Arm) -> float:
 
 
 def _with_length(theta: Array, values: Sequence[Value], arm: Arm) -> tuple[Array, tuple[str, ...]]:
-    """Return theta with theta2 and theta5 moved, least in units of their sigmas, so that ``g theta2 = l1 theta5``, and notes."""
+    """Return theta with theta2 and theta5 changed by as few sigmas as possible so that ``g theta2 = l1 theta5``, and notes on it."""
     if arm.kind != "two-link" or arm.link_length is None or arm.gravity == 0:
         raise ExportError(
             "there is no length of link 1 to keep",

@@ -25,6 +25,7 @@ __all__ = ["CorrectedSerial", "correct_serial"]
 
 Array = NDArray[np.float64]
 
+#: Names of the parameters of a payload that state the position of its mass.
 _COM = ("com_x", "com_y", "com_z")
 
 
@@ -39,7 +40,7 @@ class CorrectedSerial(Corrected):
     tilt : ndarray, shape (3, 3)
         Rotation of the base by the estimated tilt.
     exceeded : tuple of str
-        Joints that moved beyond their limits of position.
+        Names of the joints that moved beyond their limits of position in the diagnosed logs.
     expected : ndarray, shape (11 n_joints,)
         Nominal inertial parameters of links, ten each, and rotors, with an identified payload or change of a link added.
     regressor : ndarray, shape (n_states, n_joints, 11 n_joints)
@@ -56,7 +57,7 @@ class CorrectedSerial(Corrected):
     bodies: Bodies
 
     def beside(self, hanging: Array) -> CorrectedSerial:
-        """Return the model with links that are physically consistent without the parts `hanging` on them, ten inertial parameters each."""
+        """Return the model with links that stay physically consistent without the parts `hanging`, ten inertial parameters per link."""
         found, n = self.theta[: 11 * self.arm.n_joints], self.arm.n_joints
         bodies = nearest_bodies(found, self.expected, self.arm.sigma[: 11 * n], self.regressor, hanging)
         pairs = zip(self.joints, bodies.rotor - self.bodies.rotor, strict=True)
@@ -71,10 +72,10 @@ class CorrectedSerial(Corrected):
         return SimulatorModel(self.arm.name, chain, self.bodies.inertial, self.joints, self.arm.sample_period)
 
     def nominal(self) -> Arm:
-        """Return the arm with the parameters as estimated, whether or not each link by itself is physically consistent."""
+        """Return the arm with the estimated parameters, whether or not every single link is physically consistent."""
         n, theta = self.arm.n_joints, self.theta.copy()
         theta[10 * n : 11 * n] += np.array([joint.armature for joint in self.joints]) - self.bodies.rotor
-        # Columns of one kind: the ten numbers of the links, rotors, viscous and Coulomb friction.
+        # Each column holds one kind of parameter: the ten of the links, rotor inertias, viscous and Coulomb friction.
         kinds = np.column_stack([np.abs(theta[: 10 * n]).reshape(n, 10), np.abs(theta[10 * n :]).reshape(3, n).T])
         scale = np.where(kinds > 0, kinds, np.maximum(kinds.max(axis=0), np.finfo(np.float64).tiny))
         least = LEAST_SIGMA * np.concatenate([scale[:, :10].ravel(), scale[:, 10:].T.ravel()])
@@ -231,7 +232,7 @@ def _turned(cause: Cause) -> Array:
 
 
 def _exceeded(chain: SerialChain, diagnosis: Diagnosis) -> tuple[str, ...]:
-    """Return the joints that the diagnosed motion moves beyond their limits of position."""
+    """Return the names of the joints that the diagnosed motion moves beyond their limits of position."""
     beyond = np.zeros(chain.n_joints, dtype=bool)
     for _, q in positions(diagnosis, chain.n_joints):
         beyond |= (q.min(axis=0) < chain.lower) | (q.max(axis=0) > chain.upper)

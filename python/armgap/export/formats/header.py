@@ -28,7 +28,7 @@ def written(model: Corrected, remarks: Iterable[str]) -> list[str]:
 
 
 def comment(line: str) -> Any:
-    """Return an XML comment."""
+    """Return an XML comment with a line of text."""
     return ET.Comment(f" {in_comment(line)} ")
 
 

@@ -57,8 +57,8 @@ def into_description(
 ) -> CorrectedDescription:
     """Write corrected parameters into the description that the arm file was made from.
 
-    Of the description links fused into one of the arm's links, the heaviest takes the correction; the others keep their inertias. Joints get
-    friction, and all effects for which the format has a field.
+    Of the description's links that are fixed to each other and form one link of the arm, the heaviest takes the correction; the others keep
+    their inertias. Friction, and all effects for which the format has a field, are written to the joints.
 
     Parameters
     ----------

@@ -71,7 +71,7 @@ class _Writer:
         self.model = model
         self.remarks: list[str] = []
         self.angle = math.degrees(1.0) if spec.compiler.degree else 1.0
-        """Size of one radian in the file's unit of angles: degrees or radians."""
+        """Number of the file's units of angle, degrees or radians, in one radian."""
 
     def inertias(self, inertial: Mapping[str, Array], tree: Tree) -> None:
         bodies = {body.name or f"body{body.id}": body for body in self.spec.bodies}
@@ -83,7 +83,7 @@ class _Writer:
                     file=tree.file,
                 )
         if self.spec.compiler.inertiafromgeom == self.mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE:
-            # Inertias that are stated count from now on: those of all bodies as MuJoCo has computed them.
+            # From here on MuJoCo uses the inertias that are stated, so the computed ones of all bodies are written.
             self.spec.compiler.inertiafromgeom = self.mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_AUTO
             m = self.compiled
             for body in list(bodies.values())[1:]:

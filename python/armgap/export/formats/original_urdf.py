@@ -81,7 +81,7 @@ def _joint(model: CorrectedSerial, text: XmlText, element: Element, j: int, loca
     elif joint.reading:
         rotation = rotation @ about_axis(axis, -joint.reading)
     if tilted:
-        # About the origin of the base, seen from the link before the joint.
+        # The tilt is a rotation about the origin of the base; here it is expressed in the frame of the link before the joint.
         turn = located.before.T @ model.tilt @ located.before
         away = located.before.T @ (model.tilt @ located.behind - located.behind)
         shift, rotation = turn @ shift + away, turn @ rotation
@@ -101,7 +101,7 @@ def _tag(tag: str, entries: Mapping[str, Any]) -> str:
 
 def _mounting(model: CorrectedSerial, located: Located) -> tuple[str, ...]:
     """Return a remark on the direction of gravity in the frame of the root, if it is not -z."""
-    # The tilt that was found is in the file.
+    # The estimated tilt is written to the joints, so the remark states gravity without it.
     nominal = located.rotation @ (model.tilt @ model.chain.gravity)
     size = float(np.linalg.norm(nominal))
     if size == 0 or np.max(np.abs(nominal / size - _DOWN)) < _SAME:

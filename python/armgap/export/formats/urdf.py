@@ -64,7 +64,7 @@ def render(model: Corrected) -> str:
 
 
 def assumed(arm: SimulatorModel) -> list[str]:
-    """Return remarks on settings that a simulator needs besides the URDF file."""
+    """Return remarks on settings that a simulator needs in addition to the URDF file, and on limits that are not known."""
     lines = [f"gravity is {np.linalg.norm(arm.chain.gravity):g} m/s^2 along -z: set it in the simulator"]
     if rotors := [
         f"{name} {number(joint.armature)}"
@@ -120,7 +120,7 @@ def _joint(root: ET.Element, arm: SimulatorModel, j: int, base: str) -> None:
     joint = ET.SubElement(root, "joint", name=chain.joint_names[j], type=kind)
     ET.SubElement(joint, "parent", link=chain.link_names[j - 1] if j else base)
     ET.SubElement(joint, "child", link=chain.link_names[j])
-    # A position is what the encoder shows: the frame lies where that is zero.
+    # Positions in the file are encoder readings: the joint's frame is placed where the reading is zero.
     axis, back = chain.axis[j], -values.reading
     shift = chain.translation[j] + (back * chain.rotation[j] @ axis if slide else 0.0)
     turned = chain.rotation[j] if slide else chain.rotation[j] @ about_axis(axis, back)

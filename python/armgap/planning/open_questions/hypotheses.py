@@ -23,15 +23,15 @@ Data = dict[str, Any]
 
 #: Change of predictions by an effect, in noise floors, from which the effect matters.
 SEVERAL = 3.0
-#: Ratio of the largest to the smallest size of an effect that is tried: from the size that matters up, or from a known bound down.
+#: Ratio of the largest to the smallest size of an effect that is tried, upwards from the size that matters or downwards from a known bound.
 _REACH = 10.0
 #: Number of sizes of an effect that are tried.
 SIZES = 5
 #: Nodes and weights of the mean over a normal distribution (Gauss-Hermite, three points).
 NODES, WEIGHTS = (-math.sqrt(3.0), 0.0, math.sqrt(3.0)), (1 / 6, 2 / 3, 1 / 6)
-#: Standard deviation of the logarithm of a stiffness, at least, in the prior of a planned question.
+#: Largest standard deviation of the logarithm of a stiffness with which values of an elastic joint are tried.
 SPREAD = 1.0
-#: An effect may imitate another if it leaves less than this part of the other's evidence in a usual motion, before its shape is fitted.
+#: An effect may imitate another one if, with only its size fitted, it leaves less than this part of that one's evidence in a usual motion.
 IMITATES = 0.5
 
 
@@ -46,11 +46,11 @@ class TestedQuestion:
     pair : HypothesisPair
         Models with and without the effect, at all sizes.
     quick : HypothesisPair
-        Models with few sizes, for the search.
+        The same models with few sizes of the effect, for the search.
     consequence : float
         Prediction error by the largest size of the effect on a usual motion, in noise floors.
     sizes : tuple of (str, float, float), optional
-        Parameter and range of its values that evidence is averaged over.
+        Parameter of the effect, and range of its values over which evidence is averaged [SI].
     """
 
     question: Question
@@ -68,7 +68,7 @@ class HypothesisBuilder:
     data : dict
         Diagnosis as a JSON object.
     usual : PredictedMotion
-        A usual motion within the limits, by which sizes are judged.
+        A usual motion within the limits, on which the consequences of sizes of effects are judged.
     scales : Scales
         Typical torques, speeds and positions in the usual motion.
     base : tuple of EffectInstance
@@ -120,7 +120,7 @@ class HypothesisBuilder:
         return [question for _, question in sorted(found, key=lambda x: x[0])]
 
     def _left_by(self, effect: EffectInstance, without: tuple[EffectInstance, ...], target: Array) -> float:
-        """Return the square of a difference that remains beside an effect and the arm's parameters; infinite if not computable."""
+        """Return the square of what an effect and a fit of the arm's values leave of the difference `target`; infinite if not computable."""
         try:
             made = self._usual.difference(HypothesisPair(((1.0, (*without, effect)),), without))
         except ValueError:
@@ -191,7 +191,7 @@ class HypothesisBuilder:
     def _tried(
         self, place: tuple[str, int | None], without: tuple[EffectInstance, ...], target: Array
     ) -> Iterable[EffectInstance]:
-        """Yield the rival's shapes, each with the size that best fits the target to first order."""
+        """Yield instances of an effect: per shape one of typical size and one of the size that best fits the target; its levels for a threshold."""
         spec = self._specs[place[0]][0]
         for shape in shapes(*place, self._scales):
             typical = EffectInstance(*place, shape.at(shape.typical))

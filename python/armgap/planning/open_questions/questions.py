@@ -17,7 +17,7 @@ __all__ = ["NONE", "Question", "asked", "known_model", "open_questions"]
 
 Data = dict[str, Any]
 NONE = "none"
-"""Word that stands for the absence of an effect in a question."""
+"""Word that stands in place of a rival effect where the question is whether an effect is present or absent."""
 
 _ORDER = ("equivalents", "candidate", "undecided", "not excited")
 
@@ -31,13 +31,13 @@ class Question:
     effect, joint : str, int or None
         Effect in question and its joint.
     against, against_joint : str, int or None
-        The other effect; ``"none"`` is the effect's absence.
+        Rival effect and its joint; ``"none"`` for the absence of `effect`.
     origin : {"asked", "equivalents", "candidate", "undecided", "not excited"}
         Reason why the question is open.
     estimate : dict of str to (value, sigma), optional
-        The diagnosis' estimates of the effect's parameters.
+        The diagnosis' estimates of the parameters of `effect` [SI].
     bound : float, optional
-        Upper 95 % limit of the effect's size.
+        Upper 95 % confidence limit of the size of `effect`, where it was not found [SI].
     why : str
         The diagnosis' remark on the effect.
     """
@@ -58,7 +58,7 @@ class Question:
 
     @property
     def rival(self) -> tuple[str, int | None]:
-        """Name of the other effect, and its joint."""
+        """Name of the rival effect, ``"none"`` for absence, and its joint."""
         return self.against, self.against_joint
 
     @property
@@ -122,7 +122,7 @@ def open_questions(data: Data) -> tuple[list[Question], list[str]]:
 
 
 def _would_stand_for(entry: Data, cause: Data) -> bool:
-    """Whether an undecided effect could replace a named cause, whose title and joint its reason mentions."""
+    """Return whether an undecided effect could replace a named cause: the reason for its status mentions the cause's title and joint."""
     where = "" if cause["joint"] is None else f", joint {cause['joint']}"
     named = f"in place of {cause.get('title')}{where} "
     return entry["status"] == "undecided" and cause["effect"] in PLANNED and named in (entry.get("why") or "")
@@ -194,5 +194,5 @@ def _once(questions: list[Question]) -> list[Question]:
 
 
 def rank(question: Question) -> int:
-    """Return the sort key of a question by its origin: causes against equivalents first."""
+    """Return the sort key of a question by its origin: 0 for causes against equivalents, which come first."""
     return _ORDER.index(question.origin) if question.origin in _ORDER else 0

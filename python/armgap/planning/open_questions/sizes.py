@@ -16,11 +16,11 @@ Array = NDArray[np.float64]
 
 #: Typical size of an added torque, as a part of the joint's RMS torque.
 PART = 0.05
-#: Typical elastic joint: natural frequency [1/s], motor's part of the inertia, damping ratio.
+#: Typical elastic joint: natural frequency of the motor on its spring [1/s], motor's part of the joint's inertia, damping ratio.
 SHAFT_RATE, MOTOR_SHARE, SHAFT_DAMPING = 100.0, 0.1, 0.2
-#: Number of values that are tried over the range of a threshold.
+#: Number of values that are tried over the possible range of an effect that is a threshold, such as a saturation level.
 _STEPS = 5
-#: Stiffness of a contact, in torques per typical position; and its damping, in torques per typical speed.
+#: Stiffness of a contact, in typical torques per typical position, and its damping, in typical torques per typical speed.
 CONTACT_STIFFNESS, CONTACT_DAMPING = 30.0, 0.5
 
 
@@ -64,7 +64,7 @@ class Scales:
 
     @classmethod
     def of(cls, arm: Arm, motion: tuple[Array, Array], tau: Array, inertia: Array, **ranges: Array) -> Scales:
-        """Return the typical sizes for a motion: positions and velocities, and torques, each of shape (n_samples, n_joints)."""
+        """Return the typical values in a motion, given by positions and velocities, and torques `tau`, each of shape (n_samples, n_joints)."""
         q, dq = motion
         torque = np.sqrt(np.mean(tau**2, axis=0))
         length = 0.3 if arm.link_length is None else float(arm.link_length[-1]) or 0.3
@@ -91,11 +91,11 @@ class Shape:
     typical : float
         Size that matters on most arms, in SI units.
     others : dict of str to float
-        The other parameters.
+        Values of the other parameters, which are fixed [SI].
     neutral : float
-        Value at which there is no effect.
+        Value of the parameter at which there is no effect [SI].
     inverse : bool
-        Whether the value is one over the size, as a stiffness whose size is its compliance.
+        Whether the parameter is one over the size: the size of a stiffness is its compliance.
     """
 
     main: str
@@ -105,7 +105,7 @@ class Shape:
     inverse: bool = False
 
     def at(self, size: float) -> dict[str, float]:
-        """Return the parameters of the effect at a size."""
+        """Return the parameters of the effect for a given size [SI]."""
         value = 1.0 / size if self.inverse else self.neutral + size
         return {self.main: value, **self.others}
 
@@ -204,7 +204,7 @@ _SHAPES: dict[str, Callable[[Scales, int], list[Shape]]] = {
 _LEVELS = ("torque_saturation", "contact")
 
 PLANNED: tuple[str, ...] = (*_SHAPES, *_LEVELS)
-"""Effects for which a motion can be planned; not an external disturbance."""
+"""Names of the effects for which a motion can be planned; an external disturbance is not among them."""
 
 
 def shapes(effect: str, joint: int | None, scales: Scales) -> list[Shape]:

@@ -8,7 +8,7 @@ from armgap.trial.methods import Method
 
 __all__ = ["CONSTANT"]
 
-#: Stribeck friction of the first joint, the effect most often named in the literature on friction; one of 24 effects.
+#: Constant guess: Stribeck friction of joint 1, the effect most often named in the literature on friction; its probability is one over 24 effects.
 GUESS = NamedCause("stribeck", 1, probability=1.0 / 24.0)
 
 

@@ -1,7 +1,7 @@
 """Baseline by residual correlation: re-estimate the arm, then name the effect whose signature correlates best with the residual torque.
 
-The residual is the equation error, compared with each candidate. The arm is re-estimated with the
-arm file's sigmas as prior; one cause is named if it explains at least a tenth of the residual's power.
+The residual torque is the equation error; the signature of each candidate is fitted to it. The arm is re-estimated with
+the arm file's sigmas as prior; one cause is named if it explains at least a tenth of the residual's power.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from armgap.trial.methods import Method
 
 __all__ = ["CORRELATION", "refit_residual"]
 
-#: Share of the residual's power that a named cause has to explain.
+#: Smallest share of the residual torque's power that an effect has to explain to be named.
 _MIN_SHARE = 0.1
 
 
 def answer(case: SealedCase) -> Answer:
-    """Name the best correlated signature; the squared correlation stands for its probability."""
+    """Return an answer that names the effect of the signature with the lowest BIC, with its squared correlation as probability."""
     made = regression_data(case)
     residual = refit_residual(case.arm, made)
     shares = [(s, _explained(s, residual)) for s in signatures(case.arm, made, made.motions[0])]
@@ -33,7 +33,7 @@ def answer(case: SealedCase) -> Answer:
 
 
 def _bic(s: Signature, share: float) -> float:
-    """Return the BIC of a signature, so that signatures of several columns have no advantage over those of one."""
+    """Return the BIC of a signature that explains `share` of the residual's power; it favours fewer columns at equal share."""
     rows, columns = s.columns.shape
     return float(rows * np.log(max(1.0 - share, 1e-12)) + columns * np.log(rows))
 
@@ -52,7 +52,7 @@ def _step(base: Array, left: Array, sigma: Array) -> Array:
 
 
 def _explained(s: Signature, residual: Array) -> float:
-    """Return the squared multiple correlation of a signature with the residual."""
+    """Return the squared multiple correlation, 0 to 1, of a signature with the residual torque."""
     fitted = s.columns @ np.linalg.lstsq(s.columns, residual, rcond=None)[0]
     return float(fitted @ fitted / (residual @ residual))
 

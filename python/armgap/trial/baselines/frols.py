@@ -1,7 +1,7 @@
 """Baseline by FROLS of SysIdentPy: forward orthogonal least squares over the effects' signatures, model order by BIC.
 
-The arm's own columns are projected out of the torques and of all signatures, so that FROLS explains what the
-re-estimated arm leaves. Terms enter as inputs of a NFIR model of degree one without lag. The probability of a named
+The columns of the arm's regressor are projected out of the torques and of all signatures, so that FROLS explains the
+residual torque of the re-estimated arm. Terms enter as inputs of a NFIR model of degree one without lag. The probability of a named
 effect is the share of the residual's power that its terms remove (the sum of their error reduction ratios).
 
 References
@@ -28,12 +28,12 @@ from armgap.trial.simulation.engine import TrialEngineMissingError
 
 __all__ = ["FROLS"]
 
-#: Terms that BIC selects from in FROLS, causes named at most, and the least share of power of a named cause.
+#: Largest numbers of terms among which BIC selects in FROLS and of causes named, and smallest share of the residual's power of a named cause.
 TERMS, MAX_CAUSES, _MIN_SHARE = 8, 4, 0.05
 
 
 def answer(case: SealedCase) -> Answer:
-    """Return an answer with the effects of the terms that FROLS keeps, most power first."""
+    """Return an answer with the effects of the terms that FROLS keeps, by descending share of the residual's power."""
     made = regression_data(case)
     q, _ = np.linalg.qr(made.base)
     found = signatures(case.arm, made, made.motions[0])
@@ -77,7 +77,7 @@ def _select(candidates: Array, target: Array) -> tuple[list[int], list[float]]:
     with warnings.catch_warnings(), contextlib.redirect_stdout(io.StringIO()):
         warnings.simplefilter("ignore")
         model.fit(X=shifted, y=target.reshape(-1, 1))
-    # Column 0 of the model's matrix is the constant.
+    # Column 0 of the regression matrix of FROLS is the constant.
     terms = [(int(i) - 1, float(r)) for i, r in zip(model.pivv, model.err, strict=False) if int(i) > 0]
     return [i for i, _ in terms], [r for _, r in terms]
 

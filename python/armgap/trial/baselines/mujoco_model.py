@@ -1,7 +1,7 @@
 """The arm of an arm file as a MuJoCo model whose parameters and effects can be set, for `mujoco.sysid`.
 
-Base parameters fix the motion of an arm but not its masses; any masses with equal base parameters give the same motion. The links are
-as light as positive inertias allow.
+Base parameters fix the motion of an arm but not its masses; any masses with equal base parameters give the same motion. The masses chosen
+are 1.2 times (link 2 of a two-link arm) or 2 times the smallest ones that leave positive inertias.
 """
 
 from __future__ import annotations
@@ -16,13 +16,14 @@ from armgap.trial.simulation.engine import mujoco
 
 __all__ = ["build_spec", "set_coulomb", "set_inertial"]
 
-#: Longest internal time step of the MuJoCo model, s, and impedance of friction: as stiff as the step allows, as for the logs.
+#: Longest internal time step of the MuJoCo model, s, and impedance of its friction constraints, as in the simulation of the logs.
 _STEP, IMPEDANCE = 2.5e-3, 0.9999
+#: Positive number that stands for zero in masses, inertias and friction levels of the MuJoCo model, SI.
 TINY = 1e-9
 
 
 def build_spec(arm: Arm) -> Any:
-    """Return a MuJoCo model of the arm: joints ``joint0``, ..., one actuator and one position sensor each."""
+    """Return the MuJoCo specification of an arm: joints ``joint0``, ``joint1``, ..., each with one actuator and one position sensor."""
     mj = mujoco()
     spec = mj.MjSpec()
     spec.option.timestep = arm.sample_period / np.ceil(arm.sample_period / _STEP - TINY)
@@ -74,7 +75,7 @@ def set_inertial(spec: Any, arm: Arm, theta: Array) -> None:
 
 
 def _set_pendulum(spec: Any, inertia: float, moment: float) -> None:
-    mass = 2.0 * moment**2 / inertia + TINY  # half of the inertia lies about the centre of mass
+    mass = 2.0 * moment**2 / inertia + TINY  # half of the inertia about the joint is inertia about the centre of mass
     _set_link(spec, 0, mass, moment / mass, inertia - moment**2 / mass)
 
 

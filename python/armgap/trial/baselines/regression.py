@@ -4,8 +4,8 @@ A baseline uses ``residual = tau - Y theta``: the torque that the arm file's mod
 re-estimated or not. Each effect of the library leaves a known signature in the residual, linear in its size once its shape
 (a velocity, a period, a level, ...) is fixed; shapes come from a grid. Velocities and accelerations are those of a cubic
 through the samples within 15 ms (Savitzky-Golay); torques go through the same cubic, and both sides are averaged over
-blocks of 10 ms, so that no side carries a phase the other lacks. Blocks in which a joint is slow, or turns round within
-the cubic, are left out of its rows, as usual: dry friction takes any value there.
+blocks of 10 ms, so that both sides have the same phase. Blocks in which a joint is slow, or reverses within the
+cubic, are left out of the joint's rows, since dry friction can take any value there.
 
 References
 ----------
@@ -29,9 +29,9 @@ __all__ = ["Motion", "RegressionData", "motion", "regression_data", "regressor"]
 Array = NDArray[np.float64]
 #: Half width of the smoothing cubic, and length of a block of averaged samples, s.
 _HALF_WIDTH, BLOCK = 0.015, 0.010
-#: Speed below which a joint is slow and its rows are left out, as a share of its usual top speed.
+#: Speed below which a joint counts as slow and its rows are left out, as a share of the 95th percentile of its speed.
 SLOW = 0.02
-#: Standard deviation of a joint's residual torque, at least, as a share of its torque.
+#: Smallest standard deviation assumed for a joint's residual torque, as a share of that of its torque.
 _TRUST = 0.005
 
 
@@ -46,9 +46,9 @@ class Motion:
     q, dq, ddq, tau : ndarray, shape (n, n_joints)
         Smoothed positions, velocities, accelerations and torques [SI].
     raw : ndarray, shape (n, n_joints)
-        Commands as logged, before smoothing.
+        Commanded torques as logged, before smoothing [N m or N].
     half, block : int
-        Samples on each side of a smoothing cubic; samples in a block.
+        Number of samples on each side of a smoothing cubic, and in a block.
     """
 
     t: Array
@@ -61,7 +61,7 @@ class Motion:
     block: int
 
     def blocks(self, columns: Array) -> Array:
-        """Return columns of shape (n, ..) averaged over blocks of samples, edges left out."""
+        """Return columns of shape (n, ..) averaged over blocks of samples, without the half width of a cubic at both ends."""
         inner = columns[self.half : len(columns) - self.half]
         n = len(inner) // self.block
         shape = (n, self.block, *columns.shape[1:])
@@ -82,9 +82,9 @@ class RegressionData:
     motions : tuple of Motion
         Smoothed motions, one per log.
     scale : ndarray, shape (n_joints,)
-        Scale by which rows of each joint are divided.
+        Torque by which the rows of each joint are divided [N m or N].
     keep : ndarray of bool
-        Rows in which the joint moves.
+        Which of all rows are kept: those in which the row's joint moves.
     base : ndarray, shape (m, n_parameters)
         Scaled regressor of the arm.
     tau : ndarray, shape (m,)
@@ -106,7 +106,7 @@ def motion(log: Log) -> Motion:
     """Return the smoothed motion of a log."""
     h = float(np.median(np.diff(log.t)))
     half = max(3, round(_HALF_WIDTH / h))
-    # The command at a sample is held to the next one; at the sample itself it is half the old and half the new.
+    # A command is held from one sample to the next; at the instant of a sample the mean of the old and the new one counts.
     held = 0.5 * (log.tau + np.vstack([log.tau[:1], log.tau[:-1]]))
     q, dq, ddq = (_savgol(log.q, half, order, h) for order in range(3))
     return Motion(log.t - log.t[0], q, dq, ddq, _savgol(held, half, 0, h), log.tau, half, max(1, round(BLOCK / h)))

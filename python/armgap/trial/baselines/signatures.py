@@ -1,4 +1,4 @@
-"""Signatures of the effects in the torque residual, with shapes on a grid, for all regression baselines."""
+"""Signatures of the effects in the residual torque, for all regression baselines; shapes (velocities, periods, levels) are on a grid."""
 
 from __future__ import annotations
 
@@ -14,8 +14,10 @@ __all__ = ["Signature", "signatures"]
 
 #: Step of numerical derivatives by positions, rad.
 POSITION_STEP = 1e-5
-DELAYS = (0.001, 0.002, 0.004, 0.008, 0.016)  # s
+DELAYS = (0.001, 0.002, 0.004, 0.008, 0.016)  # delays and time constants tried, s
+#: Levels of torque saturation that are tried, as shares of the largest command.
 LEVELS = (0.5, 0.65, 0.8, 0.9)
+#: Number of spatial frequencies of torque ripple that are tried.
 _ORDERS = 12
 
 #: Signatures of an effect, one per shape: columns (n, k) in the joint's own rows, or (n, n_joints, k).
@@ -29,9 +31,9 @@ class Signature:
     Attributes
     ----------
     effect, joint
-        Name of the effect, and joint from 1.
+        Name of the effect, and its joint from 1; None for the whole arm.
     columns : ndarray, shape (m, k)
-        Rows as in `RegressionData`.
+        Torque per unit of the effect's size, scaled and in rows as in `RegressionData`.
     """
 
     effect: str
@@ -45,11 +47,11 @@ def signatures(arm: Arm, made: RegressionData, ref: Motion) -> list[Signature]:
     Parameters
     ----------
     arm : Arm
-        Arm file.
+        Arm with nominal parameters.
     made : RegressionData
-        Motions and scale.
+        Regression that gives the motions and the scale of each joint's rows.
     ref : Motion
-        Motion whose speeds, levels and travel set the grid; one for training and holdout.
+        Motion whose speeds, torques and travel set the grid of shapes; the same for training and holdout.
     """
     found: list[Signature] = []
     for j in range(arm.n_joints):
@@ -72,7 +74,7 @@ def _built(effect: str, joint: int | None, made: RegressionData, shapes: Callabl
 
 
 def _placed(columns: Array, joint: int | None, n: int) -> Array:
-    """Return columns of one joint placed in the rows of all joints, zero in others."""
+    """Return columns of one joint as columns of all joints, shape (n, n_joints, k), with zeros for the other joints."""
     if columns.ndim == 3 or joint is None:
         return columns
     full = np.zeros((len(columns), n, columns.shape[1]))
@@ -145,7 +147,7 @@ def _backlash(_: Arm, x: Motion, j: int, ref: Motion) -> Shapes:
 
 
 def _gain(arm: Arm, x: Motion, j: int, ref: Motion) -> Shapes:
-    # The nominal torque, not the commanded one, which would explain itself.
+    # The signature is the nominal torque: the commanded torque is the output of the regression itself.
     yield _one(regressor(arm, x.q, x.dq, x.ddq)[:, j] @ arm.theta)
 
 
@@ -230,7 +232,7 @@ def _pulse(_: Arm, x: Motion, j: int, ref: Motion) -> Shapes:
 
 def _payload(arm: Arm, x: Motion, j: int, ref: Motion) -> Shapes:
     if arm.kind == "pendulum":
-        direction = np.array([0.3, arm.gravity])  # at 0.3 m; the distance hardly matters beside the mass
+        direction = np.array([0.3, arm.gravity])  # payload at 0.3 m; its distance matters little compared with its mass
     else:
         l1, d = (arm.link_length[0], 0.7 * arm.link_length[1]) if arm.link_length is not None else (0.4, 0.2)
         g = arm.gravity

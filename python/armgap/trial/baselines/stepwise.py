@@ -2,8 +2,8 @@
 
 In every step the effect (with the best shape of its grid) that lowers BIC most is added; BIC counts a term per coefficient and
 one for the choice among shapes, twice the logarithm of their number. The arm's parameters are
-re-estimated each time with the arm file's sigmas as prior. Of candidates that lower BIC by more than ten the first is taken
-that lowers the held-out residual by two percent too (not required of external pulses). At most four are named.
+re-estimated each time with the arm file's sigmas as prior. Of the effects that lower BIC by more than ten, the first is added
+that also lowers the residual power on the holdout by two percent (not required of external pulses). At most four are named.
 
 References
 ----------
@@ -26,9 +26,10 @@ from armgap.trial.methods import Method
 
 __all__ = ["STEPWISE"]
 
-#: Causes named by stepwise regression at most, as in a diagnosis; decrease of the BIC that a cause has to bring; factor on the holdout's error that
-#: it has to stay below.
+#: Stepwise regression: largest number of causes, as in a diagnosis; smallest decrease of BIC by a cause; and upper bound of the
+#: ratio of the residual powers on the holdout with and without a cause.
 MAX_CAUSES, EVIDENCE, HELD_OUT = 4, 10.0, 0.98
+#: Effects that act in one log only, so that the holdout cannot confirm them.
 EVENTS = ("external_pulse",)
 
 
@@ -43,19 +44,19 @@ class _Problem:
     rows: int
 
     def fit(self, extra: Array) -> tuple[float, Array]:
-        """Return residual power and coefficients of the fit with further columns."""
+        """Return the residual power and the coefficients of the fit with `extra` columns added."""
         all_columns = np.hstack([self.columns, extra])
         coefficients = np.asarray(np.linalg.lstsq(all_columns, self.target, rcond=None)[0], dtype=np.float64)
         left = self.target - all_columns @ coefficients
         return float(left @ left), coefficients
 
     def bic(self, extra: Array, terms: int) -> float:
-        """Return the BIC of a model with `terms` terms besides the arm's parameters."""
+        """Return the BIC of a model with `terms` terms in addition to the arm's parameters."""
         power, _ = self.fit(extra)
         return self.rows * float(np.log(max(power, 1e-300) / self.rows)) + terms * float(np.log(self.rows))
 
     def judged(self, extra: Array, held_extra: Array) -> float:
-        """Return the residual power on the holdout of the fit with further columns."""
+        """Return the residual power on the holdout of the fit with `extra` columns added."""
         _, coefficients = self.fit(extra)
         left = self.held_target - np.hstack([self.held, held_extra]) @ coefficients
         return float(left @ left)
@@ -86,11 +87,12 @@ def answer(case: SealedCase) -> Answer:
     return Answer("stepwise", "effect" if chosen else "none", tuple(chosen))
 
 
+#: BIC of the model with a candidate added, and the candidate's signature in training and in holdout rows.
 ScoredCandidate = tuple[float, Signature, Signature]
 
 
 def _confirmed(problem: _Problem, scored: list[ScoredCandidate], limit: float) -> list[ScoredCandidate]:
-    """Return the candidates from the first that the holdout confirms on; empty if no candidate below the BIC limit is confirmed."""
+    """Return the candidates, sorted by BIC, from the first that the holdout confirms on; empty if none below the BIC limit is confirmed."""
     for i, (value, s, held) in enumerate(scored):
         if value > limit:
             break
@@ -137,7 +139,7 @@ def _holds(problem: _Problem, s: Signature, held: Signature) -> bool:
 
 
 def _weight(scored: list[ScoredCandidate], chosen: Signature) -> float:
-    """Return the posterior weight of an effect against all others, from their best BICs."""
+    """Return the posterior weight, 0 to 1, of an effect among all candidates: ``exp(-BIC/2)`` of its best shape over the sum for all."""
     best: dict[tuple[str, int | None], float] = {}
     for value, s, _ in scored:
         key = (s.effect, s.joint)

@@ -1,10 +1,10 @@
 """Baseline by `mujoco.sysid`, MuJoCo's identification tool: parameters that differ from neutral values name the effects.
 
 The parameters with which MuJoCo can express an effect of the library are freed at once, together with the arm's own, and fitted
-by `mujoco.sysid.optimize` to predictions over short windows. Left out are those that no fit separates from the arm's own or
-from another's: torque gain, armature of the first joint, payload, and tilt beside the first encoder's zero. The report
-gives an interval for every parameter and warns of those at a bound. An effect is named if its interval excludes the value
-that means no effect and it stands at no bound; most intervals away from that value first, four at most.
+by `mujoco.sysid.optimize` to predictions over short windows. Left out are those that no fit separates from the arm's own or from
+those of another effect: torque gain, armature of joint 1, payload, and base tilt (from the zero of encoder 1). The report gives
+an interval for every parameter and warns of those at a bound. An effect is named if the interval of its parameter excludes the
+neutral value and the parameter is at no bound; effects most half widths away from their neutral value come first, four at most.
 
 References
 ----------
@@ -34,9 +34,9 @@ from armgap.trial.simulation.engine import TrialEngineMissingError
 
 __all__ = ["SYSID"]
 
-#: Windows that `mujoco.sysid` is fitted to, iterations at most, causes named at most, and bounds of parameters in the arm file's sigmas.
+#: Settings of the baseline: number of windows fitted, largest numbers of iterations and of causes, bounds of the arm's parameters in sigmas.
 _WINDOWS, ITERATIONS, MAX_CAUSES, _TRUST = 10, 10, 4, 4.0
-#: Effects that parameters of MuJoCo express, and their equivalents.
+#: Names of the effects that parameters of MuJoCo express, and of their equivalents.
 EXPRESSED = frozenset(
     {
         "torque_offset",
@@ -51,14 +51,15 @@ EXPRESSED = frozenset(
         "base_tilt",
     }
 )
-#: Step of finite differences, as a share of the parameters' scales: above the error of the contact solver.
+#: Step of finite differences, as a share of the parameters' scales: large enough to exceed the error of MuJoCo's constraint solver.
 FINITE_DIFFERENCE_STEP = 1e-4
+#: Function that writes the value of a parameter into a MuJoCo specification.
 Set = Callable[[Any, float], None]
 
 
 @dataclass(frozen=True)
 class EffectParameter:
-    """An effect as a parameter of a MuJoCo model: neutral value, initial value, bounds, and function that sets it."""
+    """An effect as a parameter of a MuJoCo model [SI]: value without the effect, initial value, bounds, and function that sets it."""
 
     effect: str
     joint: int | None
@@ -76,7 +77,7 @@ class EffectParameter:
 
 
 def answer(case: SealedCase) -> Answer:
-    """Estimate all parameters of the MuJoCo model at once and name those that differ from their nominal values."""
+    """Return an answer that names the effects whose parameters, all estimated at once in MuJoCo, differ from their neutral values."""
     sysid = _sysid()
     arm, windows = case.arm, _windows(case)
     effect_parameters = _effect_parameters(arm, windows)
@@ -92,7 +93,7 @@ def answer(case: SealedCase) -> Answer:
     with contextlib.redirect_stdout(io.StringIO()):
         found, result = sysid.optimize(parameters, residual, optimizer="mujoco", verbose=False, **settings)
     left, _, _ = residual(result.x, found)
-    # In units of the scales, so that no direction is taken for a null one because of its units.
+    # The Jacobian is scaled, so that no direction of parameters counts as undetermined because of its units.
     scale = _scale(parameters)
     intervals = np.asarray(sysid.calculate_intervals(left, np.asarray(result.jac) * scale)[1]).ravel() * scale
     insights = importlib.import_module("mujoco.sysid.report.sections.insights").AutomatedInsights("", found)
@@ -124,12 +125,12 @@ def _named(effect_parameters: list[EffectParameter], x: Array, intervals: Array,
 
 
 def _confidence(away: float) -> float:
-    """Return the confidence of the largest interval that excludes the neutral value, for a normal estimate `away` sigmas from it."""
+    """Return the confidence of the largest interval that excludes the neutral value, for an estimate `away` half 95 % intervals off."""
     return math.erf(1.96 * away / math.sqrt(2.0))
 
 
 def _at_bounds(insights: Any) -> list[str]:
-    """Return the parameters at a bound, by the warnings of `mujoco.sysid`."""
+    """Return the names of the parameters at a bound, from the warnings in the report of `mujoco.sysid`."""
     warnings = [i["message"] for i in insights.get_context()["insights"] if i["type"] == "warning"]
     return [w.split("<b>")[1].split("</b>")[0] for w in warnings]
 
@@ -155,12 +156,12 @@ def _sequences(sysid: Any, arm: Arm, windows: list[Window]) -> Any:
 
 
 def _compare(sysid: Any, arm: Arm, windows: list[Window]) -> Callable[..., Any]:
-    """Return a function for predicted minus measured positions at the log's samples, in multiples of their scatter."""
+    """Return a function for predicted minus measured positions, over the standard deviation of the measured displacements in windows."""
     scale = np.std(np.concatenate([w.q - w.q0 for w in windows]), axis=0)
 
     def compare(params: Any, predicted: Any, measured: Any, model: Any, return_all: bool, *, state: Array) -> Any:
         parts = round(arm.sample_period / model.opt.timestep)
-        # Positions from the state: the sensors of a step are those of its start.
+        # Positions are taken from the states, since the sensor values of a step are those at its start.
         shown = state[parts - 1 :: parts, 1 : 1 + arm.n_joints][: len(measured.data)]
         series = sysid.TimeSeries(measured.times, shown, measured.signal_mapping)
         return ((shown - measured.data) / scale).ravel(), series, measured
@@ -169,7 +170,7 @@ def _compare(sysid: Any, arm: Arm, windows: list[Window]) -> Callable[..., Any]:
 
 
 def _delayed(sysid: Any, effect_parameters: list[EffectParameter]) -> Callable[..., Any]:
-    """Return a rollout function that delays and lags commands by the delays and lags among the parameters."""
+    """Return a rollout function that delays and lags the commanded torques by the current values of these parameters."""
     late = [k for k in effect_parameters if k.effect in ("actuator_delay", "actuator_lag")]
 
     def rollout(*, control_signal: Any, param_dicts: Any, **rest: Any) -> Any:
@@ -285,7 +286,7 @@ def _joint_effect_parameters(arm: Arm, j: int, tau: Array, speed: float, travel:
         parameter("joint_spring", "k", 0.0, 0.01 * usual / travel, 0.0, 3.0 * usual / travel, spring),
         parameter("quadratic_drag", "c", 0.0, 0.01 * usual / speed**2, 0.0, 3.0 * usual / speed**2, drag),
     ]
-    if arm.rotary:  # on an axis an offset is the weight along it
+    if arm.rotary:  # on a linear axis a torque offset acts like the weight along the axis
         effect_parameters.append(parameter("torque_offset", "offset", 0.0, 0.0, -usual, usual, offset))
     if j > 0:
         effect_parameters.append(

@@ -9,7 +9,7 @@ import numpy as np
 
 from armgap.trial.simulation.arms import TURN, TrialArm
 
-#: Relative standard deviation of the nominal parameters of a trial arm.
+#: Relative standard deviations that the arm file of a trial case states: of inertial parameters, and of friction coefficients.
 SIGMA_INERTIAL = 0.05
 SIGMA_FRICTION = 0.20
 
@@ -21,7 +21,7 @@ class Nominal:
     Attributes
     ----------
     theta, sigma : tuple of float
-        Parameters and standard deviations: inertial, viscous, Coulomb [SI].
+        Parameters, in the order inertial, viscous, Coulomb, and their standard deviations [SI].
     """
 
     theta: tuple[float, ...]
@@ -29,16 +29,16 @@ class Nominal:
 
 
 def draw_nominal(rng: np.random.Generator, arm: TrialArm, exact: bool) -> Nominal:
-    """Return nominal parameters: the true ones, or the true ones plus draws from N(0, sigma)."""
+    """Return the nominal parameters of an arm: the true ones if `exact`, else with errors drawn from N(0, sigma) within 2.5 sigma."""
     truth = np.array(arm.theta)
-    # Beyond two and a half sigma the trust itself would be wrong.
+    # Errors beyond 2.5 sigma would contradict the standard deviations that the arm file states.
     error = np.zeros(truth.size) if exact else np.clip(rng.standard_normal(truth.size), -2.5, 2.5)
     theta = tuple(float(x) for x in truth * (1.0 + _relative(arm) * error))
     return Nominal(theta, tuple(float(f"{x:.3g}") for x in spread(arm, theta)))
 
 
 def spread(arm: TrialArm, theta: tuple[float, ...]) -> tuple[float, ...]:
-    """Return the standard deviations that an arm file states with parameters `theta`."""
+    """Return the standard deviations that the arm file of a trial case states for parameters `theta` [SI]."""
     truth, stated = np.array(arm.theta), np.abs(theta)
     sigma = np.where(truth != 0, _relative(arm) * stated, SIGMA_INERTIAL * np.max(truth))
     return tuple(float(x) for x in sigma)

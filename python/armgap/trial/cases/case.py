@@ -23,29 +23,30 @@ from armgap.trial.simulation.excitation import STYLES, Excitation, Tracked, acce
 from armgap.trial.simulation.plant import PlantConfig
 from armgap.trial.simulation.simulated_arm import SimulatedArm, Trace, run
 
-#: Motions drawn for a case before it is given up.
+#: Largest number of motions drawn for one log before its case is given up.
 ATTEMPTS = 30
-#: Steps by which an invisible hidden effect is made larger at most, and increase of its size per step.
+#: Largest number of sizes tried for a hidden effect until it is visible, and increase of the size (on its scale from 0 to 1) from one to the next.
 GROWTHS, _GROWTH = 8, 0.15
-#: One of this many hidden effects is shrunk for as long as it stays visible; largest number of steps, and decrease of its size per step.
+#: One in `SHRUNK_ONE_IN` hidden effects is made smaller while it stays visible: largest number of steps, and decrease of its size (0 to 1) per step.
 SHRUNK_ONE_IN, _SHRINKS, SHRINK = 5, 6, 0.4
 #: Position and speed beyond which a simulated arm counts as diverged, rad and rad/s (m and m/s).
 _REACH, SPEED = 10.0, 30.0
-#: Controllers tried on an arm with hidden effects, each half as stiff as the preceding one.
+#: Largest number of controllers tried on an arm with hidden effects, each half as stiff as the preceding one.
 DETUNINGS = 6
 
+#: Effect to be hidden: its name, and its joint from 1; None for an effect of the whole arm.
 EffectRequest = tuple[str, int | None]
 #: Hidden effects, their size from 0 to 1, and their visibility.
 SizedEffects = tuple[list[HiddenEffect], float, Visibility]
 
 
 class NoMotionError(ArmgapError, RuntimeError):
-    """No acceptable motion was found for an arm; another seed helps."""
+    """Error: no acceptable motion was found for an arm of a trial; another seed helps."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """A finished case of a trial.
+    """A finished case of a blind trial: arm file, simulated logs, and key with the hidden effects.
 
     Attributes
     ----------
@@ -54,7 +55,7 @@ class Case:
     arm_file : str
         Text of ``arm.toml``.
     logs : dict of str to Trace
-        ``train-1``, ``holdout-1``, ...
+        Simulated logs by name: ``train-1``, ``holdout-1``, ...
     key : Key
         Key with the hidden effects.
     """
@@ -101,15 +102,15 @@ def make_case(
     size : float, optional
         Size of the effects, from 0, just above detectable, to 1, large; drawn by default.
     nominal : {"off", "exact"}
-        Whether the arm file's values are off by draws from their sigma.
+        Whether the arm file's parameters have errors drawn from their standard deviations, or are the true ones.
     style : {"multisine", "paper", "tracked"}, optional
-        Motion; drawn per log by default.
+        Style of the motions; drawn for each log by default.
     sample_period : float, optional
         Sample period [s]; drawn from 1 to 5 ms by default.
     duration : float, default 10
         Length of each log, s.
     n_train, n_holdout : int, default 1
-        Numbers of logs, each with its own motion.
+        Numbers of training and holdout logs, each with its own motion.
 
     Raises
     ------
@@ -223,7 +224,7 @@ def _alone(
     duration: float,
     size: float,
 ) -> SizedEffects | None:
-    """Return one effect of a size, alone on the arm, with its visibility; None if the arm diverges."""
+    """Return one hidden effect of a given size (0 to 1), simulated without the other ones, and its visibility; None if the arm diverges."""
     hidden = list(_draw_hidden([number], [size], arm, [request], list(plain.values()), list(plain)))
     logs = _measure(arm, hidden, motions, duration)
     if not _sane(logs):
@@ -234,7 +235,7 @@ def _alone(
 def _fit_size(
     number: int, size: float, may_shrink: bool, at: Callable[[float], SizedEffects | None]
 ) -> SizedEffects | None:
-    """Enlarge an effect until it is visible, or as far as possible; shrink one in :data:`SHRUNK_ONE_IN` to the limit of visibility."""
+    """Enlarge a hidden effect until it is visible, or as far as possible; shrink one in :data:`SHRUNK_ONE_IN` to the limit of visibility."""
     best = at(size)
     for growth in range(1, GROWTHS):
         if best is None or best[2].visible:
@@ -303,7 +304,7 @@ def _log(arm: TrialArm, hidden: Sequence[HiddenEffect], name: str, motion: Excit
 
 
 def _sane(logs: dict[str, Trace]) -> bool:
-    """Whether no log of a case diverges."""
+    """Return whether no log of a case diverges."""
     return all(bool(np.max(np.abs(x.q)) < _REACH and np.max(np.abs(x.dq_true)) < SPEED) for x in logs.values())
 
 

@@ -24,8 +24,10 @@ DEMO_EFFECTS = (
     "torque_gain",
     "torque_offset",
 )
+#: Effects of `DEMO_EFFECTS` that act on the whole arm, not on one joint.
 WHOLE_ARM = ("base_tilt", "payload")
-SAMPLE_PERIOD = 0.0025  # s, as in Reyes and Kelly (1997)
+SAMPLE_PERIOD = 0.0025  # sample period of the demo case's logs, s, as in Reyes and Kelly (1997)
+#: Largest number of seeds tried until one gives the demo case an acceptable motion.
 RETRIES = 10
 
 
@@ -40,7 +42,7 @@ def make_demo_case(seed: int = DEMO_SEED) -> Case:
     Raises
     ------
     NoMotionError
-        No acceptable motion was found; rare, another seed helps.
+        No acceptable motion was found, which is rare; another seed helps.
     """
     rng = np.random.default_rng([seed, 0])
     effect = str(rng.choice(DEMO_EFFECTS))

@@ -36,9 +36,9 @@ class HiddenEffect:
     parameters : dict of str to float
         True parameters [SI].
     log : str or None
-        Log with the effect, for an event; None for an effect in all logs.
+        Name of the only log in which an event acts; None for an effect that acts in all logs.
     family : str
-        ``"library"``, ``"further"`` or ``"outside"``.
+        ``"library"`` (one of the 24 standard effects), ``"further"`` (a known effect beyond them) or ``"outside"`` (in no library).
     """
 
     effect: str
@@ -69,11 +69,11 @@ class Key:
     nominal : {"exact", "off"}
         Whether the arm file's parameters are exact or off.
     theta : tuple of float
-        The arm's true parameters: inertial, viscous, Coulomb.
+        The arm's true parameters: inertial, viscous, Coulomb [SI].
     details : dict
-        How the case was made: seed, arm, motions, and how far the effects move the arm.
+        How the case was made: seed, physics engine, arm and motions; sizes and visibility of the hidden effects.
     nonce : str
-        Random text, without which a short key could be found from its hash by search.
+        Random text that prevents finding the key from its hash by trying all possible keys.
     """
 
     effects: tuple[HiddenEffect, ...]
@@ -143,7 +143,7 @@ def check_seal(case: str | Path) -> str:
     Raises
     ------
     SealError
-        As in `open_key`.
+        A file is missing, the arm file has no seal, or the key is not the one that was sealed.
     """
     folder = Path(case)
     seal, found = sealed_hash(folder), hashlib.sha256(_content(folder / KEY_FILE)).hexdigest()

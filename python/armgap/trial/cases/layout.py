@@ -15,15 +15,15 @@ _CASE = "case-"
 
 
 def case_name(number: int) -> str:
-    """Return the name of a case's folder, by number."""
+    """Return the name of the folder of case `number`, counted from 0."""
     return f"{_CASE}{number:04d}"
 
 
 def case_folders_in(folder: Path) -> list[Path]:
-    """Return the folders of the cases of a trial, in order; unfinished ones have hidden names and are left out."""
+    """Return the case folders in a trial's folder, sorted by name, without unfinished ones, whose names begin with a dot."""
     return sorted(p.parent for p in folder.glob(f"*/{ARM_FILE}") if not p.parent.name.startswith("."))
 
 
 def belongs(entry: Path) -> bool:
-    """Whether an entry of a trial's folder belongs to the trial; pages of scores may lie beside these."""
+    """Return whether a file or folder in a trial's folder is part of the trial; other files there may be pages of scores."""
     return entry.name in (MANIFEST, ANSWERS) or entry.name.startswith(_CASE) or (entry / ARM_FILE).exists()

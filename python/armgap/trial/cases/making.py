@@ -1,6 +1,6 @@
-"""Making of a trial on disk: numbered case folders beside a manifest, which does not reveal the hidden effects.
+"""Making of a trial on disk: numbered case folders, and a manifest that does not reveal the hidden effects.
 
-An interrupted trial can be resumed: a case folder appears only when it is complete, and existing ones are kept.
+An interrupted trial can be resumed: a case folder appears only when it is complete, and existing case folders are kept.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def make_cases(folder: Path, seed: int, cases: int, duration: float = 10.0, work
     duration : float, default 10
         Length of each log [s].
     workers : int, default 1
-        Processes.
+        Number of processes.
 
     Yields
     ------
@@ -100,7 +100,7 @@ def read_manifest(folder: str | Path) -> Manifest | None:
 
 
 def seal_of_all(cases: list[Path]) -> str:
-    """Return one hash over the seals of all cases."""
+    """Return one SHA-256 over the seals of all cases of a trial."""
     return hashlib.sha256("".join(sealed_hash(c) for c in cases).encode()).hexdigest()
 
 
@@ -136,6 +136,6 @@ def _make(plan: Plan, target: Path) -> Path:
         try:
             write_folder(target, case.write)
         except ResultError:
-            if not target.is_dir():  # else another process has made the same case meanwhile
+            if not target.is_dir():  # otherwise another process has made the same case meanwhile
                 raise
     return target

@@ -34,7 +34,7 @@ class SealedCase:
 
     @classmethod
     def read(cls, folder: str | Path) -> SealedCase:
-        """Read arm file and logs of a case folder; the key stays closed.
+        """Read arm file and logs of a case folder, but not its key.
 
         Raises
         ------

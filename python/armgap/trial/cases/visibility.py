@@ -4,8 +4,8 @@ An effect may leave a trace in two ways. Either prediction errors over short win
 multiple of those without the effect; or re-estimation absorbs the effect, and the parameters end up far from the
 arm file's. An effect that does neither cannot be found by any method, and its case is counted apart.
 
-The floor is the prediction error for the same motions without the effect: the part of encoder steps and of start states
-taken from them.
+The floor is the prediction error for the same motions without the effect, which comes from the encoder steps and from
+the initial states measured with these steps.
 """
 
 from __future__ import annotations
@@ -66,14 +66,14 @@ def visibility(arm: TrialArm, plain: dict[str, Trace], logs: dict[str, Trace], e
     plain, logs : dict of str to Trace
         The logs without and with the effect.
     everywhere : bool, default True
-        Whether the effect acts in all logs. If so, the smaller visibility of training and holdout
-        counts; for an external pulse only training logs, which hold it.
+        Whether the effect acts in all logs. If so, the smaller visibility of training and holdout logs
+        counts; if not, as for an external pulse, that of the training logs.
     """
     m = Mechanism(arm.kind, arm.gravity, arm.length)
     theta = np.array(arm.theta)
     sigma = np.array(spread(arm, arm.theta))
     without = misses(m, theta, _windows(plain, ""))
-    rounding = np.array(arm.step) / math.sqrt(12.0)  # standard deviation of what rounding to whole steps does
+    rounding = np.array(arm.step) / math.sqrt(12.0)  # standard deviation of rounding to encoder steps
     noise = np.maximum(np.median(np.sqrt(np.mean(without**2, axis=1)), axis=0), rounding)
     found = refit(m, theta, sigma, _windows(logs, "train"), noise)
     judged = ("train", "holdout") if everywhere else ("train",)
@@ -88,7 +88,7 @@ def _windows(logs: dict[str, Trace], part: str) -> list[Window]:
 
 
 def _worst(error: Array) -> Array:
-    """Return the RMS per joint over the windows with the largest errors."""
+    """Return the RMS prediction error per joint [rad or m] over the share `_SHARE` of windows with the largest errors."""
     squares = np.sort(np.mean(error**2, axis=1), axis=0)[::-1]
     rms: Array = np.sqrt(np.mean(squares[: max(1, round(_SHARE * len(squares)))], axis=0))
     return rms

@@ -1,7 +1,7 @@
 """Short windows of a log, predicted from measured starts by the arm file's model, and re-estimation of the model.
 
-The model that a diagnosis re-estimates decides what re-estimation can absorb; so armgap's own dynamics predict here,
-unlike in the simulation of the logs.
+Which effects re-estimation can absorb depends on the model that a diagnosis re-estimates; so windows are predicted with
+armgap's own dynamics, while the logs are simulated with MuJoCo.
 """
 
 from __future__ import annotations
@@ -15,20 +15,22 @@ from numpy.typing import NDArray
 from armgap import _native
 
 Array = NDArray[np.float64]
+#: Effect as the compiled simulator reads it: name, joint (from 1; None for the whole arm), parameters [SI].
 NativeEffect = tuple[str, int | None, dict[str, float]]
 
 #: Length of a prediction window, s.
 WINDOW = 0.2
-#: Half width of the local cubic that gives start states, s, and its number of samples at least.
+#: Half width of the local cubic that gives initial states, s, and the smallest number of samples on either side of its middle.
 AROUND, FEWEST = 0.012, 4
 #: Tolerances of a simulation, rad (m), tried in order until one is reached.
 TOLERANCES = (1e-8, 1e-6, 1e-4)
+#: Largest number of Gauss-Newton steps of a re-estimation, and step of its finite differences, in standard deviations of the prior.
 _STEPS, _STEP = 8, 1e-4
 
 
 @dataclass(frozen=True)
 class Mechanism:
-    """Kind, gravity and lengths of an arm, which stay fixed when its parameters are estimated."""
+    """Kind, gravity [m/s^2] and link lengths [m] of an arm, which stay fixed when its parameters are estimated."""
 
     kind: str
     gravity: float
@@ -37,7 +39,7 @@ class Mechanism:
 
 @dataclass(frozen=True)
 class Window:
-    """Prediction window of a log: times and torques from its start, measured start state, and positions to predict.
+    """Prediction window of a log: times and torques, initial state as measured, and positions to predict.
 
     Attributes
     ----------
@@ -46,9 +48,9 @@ class Window:
     tau : ndarray, shape (n + 1, n_joints)
         Commanded torques [N m or N].
     q0, dq0 : ndarray, shape (n_joints,)
-        Start state, from the measured positions around the start.
+        Initial position [rad or m] and velocity, from a local cubic through the measured positions around the start.
     q : ndarray, shape (n, n_joints)
-        Measured positions after the start.
+        Measured positions after the start [rad or m].
     """
 
     t: Array
@@ -59,7 +61,7 @@ class Window:
 
 
 def cut(t: Array, q: Array, tau: Array, length: float = WINDOW) -> list[Window]:
-    """Return a log cut into consecutive prediction windows."""
+    """Return a log cut into consecutive prediction windows of `length` seconds."""
     h = float(np.median(np.diff(t)))
     rows, margin = round(length / h), max(FEWEST, round(AROUND / h))
     return [_window(t, q, tau, s, rows, margin) for s in range(margin, len(t) - max(rows, margin) - 1, rows)]
@@ -113,11 +115,12 @@ def refit(
     noise : ndarray, shape (n_joints,)
         Standard deviation of a perfect model's prediction error, per joint [rad or m].
     effects : sequence of (name, joint, parameters)
-        Effects with fixed parameters.
+        Effects added to the model, with fixed parameters.
 
     Returns
     -------
     ndarray, shape (n_parameters,)
+        Estimated parameters [SI].
     """
     best, cost = theta, _cost(m, theta, theta, sigma, windows, noise, effects)
     for _ in range(_STEPS):

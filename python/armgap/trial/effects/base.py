@@ -10,8 +10,9 @@ import numpy as np
 from armgap.trial.simulation.arms import TrialArm
 from armgap.trial.simulation.simulated_arm import Array, SimulatedArm, Trace
 
+#: Values of an effect's parameters by name [SI].
 Parameters = dict[str, float]
-#: Smallest travel common to all logs of a case, as a share of the smallest range of positions in any log.
+#: Smallest acceptable travel of a joint that all logs of a case have in common, as a share of its smallest range of positions in any log.
 COMMON = 0.2
 
 
@@ -26,17 +27,17 @@ class JointUsage:
     Attributes
     ----------
     torque, peak : float
-        RMS and largest command, N m.
+        RMS command over all logs, and largest command that every log reaches, N m.
     slew : float
         98th percentile of the command's rate of change, N m/s.
     speed : float
         95th percentile of the speed, rad/s.
     low, high : float
-        Positions reached in every log, rad.
+        Lowest and highest position reached in every log, rad.
     span : float
-        Range of positions of the log that has the smallest, rad.
+        Smallest range of positions in any log, rad.
     duration : float
-        Length of a log [s].
+        Length of the shortest log [s].
     """
 
     torque: float
@@ -63,7 +64,7 @@ class JointUsage:
 
 
 def usage(traces: list[Trace], joint: int) -> JointUsage:
-    """Return the usage of a joint (from 0) over all logs of a case."""
+    """Return torques, speeds and positions of a joint (from 0) over all logs of a case."""
     tau = np.concatenate([x.tau[:, joint] for x in traces])
     dq = np.concatenate([x.dq_true[:, joint] for x in traces])
     return JointUsage(
@@ -138,7 +139,7 @@ class TrialEffect:
     per_joint : bool
         Whether the effect acts on one joint, not on the whole arm.
     family : {"library", "further", "outside"}
-        One of the 24 standard effects; a known effect beyond them; one meant to be outside any library.
+        ``library``: one of the 24 standard effects; ``further``: a known effect beyond them; ``outside``: an effect in no library.
     kinds : tuple of str
         Kinds of arm on which the effect is possible.
     draw : callable
@@ -155,11 +156,14 @@ class TrialEffect:
     apply: Callable[[SimulatedArm, int, Parameters], None]
 
 
+#: Kinds of arm on which an effect is possible: those with rotary joints, all, and the arm with two links.
 ROTARY = ("pendulum", "two-link")
 ANY = ("axis", "pendulum", "two-link")
 TWO_LINK = ("two-link",)
+#: Hidden effects by name.
 REGISTRY: dict[str, TrialEffect] = {}
 
+#: Function that adds an effect to a joint (from 0) of a simulated arm, with the effect's parameters.
 Apply = Callable[[SimulatedArm, int, Parameters], None]
 
 

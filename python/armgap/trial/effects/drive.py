@@ -1,4 +1,4 @@
-"""Hidden effects of the drive: between the command and the joint."""
+"""Hidden effects of the drive, which act between the commanded torque and the joint."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from armgap.trial.simulation.actuator import DeadZone, Delay, Gain, Lag, Magneti
 from armgap.trial.simulation.plant import TIME_STEP, Rotor
 from armgap.trial.simulation.simulated_arm import SimulatedArm
 
+#: One turn of a joint, rad.
 SPAN = 2.0 * math.pi
 
 
@@ -31,7 +32,7 @@ def torque_gain(sim: SimulatedArm, joint: int, p: Parameters) -> None:
 
 @effect("actuator_lag", lambda d: {"time_constant": d.between(0.001, 0.02)})
 def actuator_lag(sim: SimulatedArm, joint: int, p: Parameters) -> None:
-    """Add a first-order lag to the torque of a joint."""
+    """Add a first-order lag of ``time_constant`` seconds to the torque of a joint."""
     sim.actuators[joint].add(Lag(p["time_constant"]))
 
 
@@ -43,7 +44,7 @@ def _draw_delay(d: Draw) -> Parameters:
 
 @effect("actuator_delay", _draw_delay)
 def actuator_delay(sim: SimulatedArm, joint: int, p: Parameters) -> None:
-    """Delay the torque of a joint by a whole number of internal steps."""
+    """Delay the torque of a joint by ``delay`` seconds, a whole number of internal steps."""
     sim.actuators[joint].add(Delay(p["delay"]))
 
 
@@ -95,7 +96,7 @@ def joint_elasticity(sim: SimulatedArm, joint: int, p: Parameters) -> None:
     sim.config.rotors[joint] = Rotor(p["rotor_inertia"], p["stiffness"], p["damping"])
 
 
-#: Rotor inertia on the motor side of backlash, as a share of the joint's inertia.
+#: Rotor inertia on the motor side of backlash, as a share of the driven link's inertia about its centre of mass.
 BACKLASH_ROTOR = 0.12
 
 
@@ -103,7 +104,7 @@ BACKLASH_ROTOR = 0.12
 def backlash(sim: SimulatedArm, joint: int, p: Parameters) -> None:
     """Add backlash of total width ``gap`` between motor and joint; the encoder is on the joint's side.
 
-    The motor's inertia is a share of the last link's, so that without play the arm is the nominal one.
+    The motor's inertia is taken out of the driven link's, so that without play the arm is the nominal one.
     """
     inertia = BACKLASH_ROTOR * sim.config.arm.inertia[joint]
     sim.config.rotors[joint] = Rotor(inertia, gap=p["gap"], part_of_link=True)
@@ -115,7 +116,7 @@ def backlash(sim: SimulatedArm, joint: int, p: Parameters) -> None:
     family="outside",
 )
 def slew_limit(sim: SimulatedArm, joint: int, p: Parameters) -> None:
-    """Limit the rate of change of a joint's torque to ``rate`` per second."""
+    """Limit the rate of change of a joint's torque to ``rate`` [N m/s or N/s]."""
     sim.actuators[joint].add(SlewLimit(p["rate"]))
 
 
@@ -125,7 +126,7 @@ def slew_limit(sim: SimulatedArm, joint: int, p: Parameters) -> None:
     family="outside",
 )
 def motor_hysteresis(sim: SimulatedArm, joint: int, p: Parameters) -> None:
-    """Let part of a joint's torque follow the command through a play, like the flux in magnetically hard iron."""
+    """Let the part ``share`` of a joint's torque follow the command through a play, as a model of magnetic hysteresis."""
     sim.actuators[joint].add(MagneticHysteresis(p["width"], p["share"]))
 
 

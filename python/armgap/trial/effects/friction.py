@@ -10,12 +10,12 @@ from armgap.trial.simulation.simulated_arm import SimulatedArm
 
 
 def torque_law(sim: SimulatedArm, joint: int, law: TorqueLaw) -> None:
-    """Add a law for an additional torque to a joint."""
+    """Add a function of the joint's state for an additional torque [N m or N] to a joint of a simulated arm."""
     sim.config.torque_laws.setdefault(joint, []).append(law)
 
 
 def friction_law(sim: SimulatedArm, joint: int, law: FrictionLaw) -> None:
-    """Add a law for an additional Coulomb friction level to a joint."""
+    """Add a function of the joint's state for an additional Coulomb friction level [N m or N] to a joint of a simulated arm."""
     sim.config.friction_laws.setdefault(joint, []).append(law)
 
 
@@ -55,7 +55,7 @@ def quadratic_drag(sim: SimulatedArm, joint: int, p: Parameters) -> None:
 
 @effect("load_dependent_friction", lambda d: {"mu": d.between(0.05, 0.4)}, kinds=("pendulum", "two-link"))
 def load_dependent_friction(sim: SimulatedArm, joint: int, p: Parameters) -> None:
-    """Add ``mu |C dq + g|`` to the Coulomb friction of a joint: a part of the load by gravity and the other link."""
+    """Add ``mu |C dq + g|`` to the Coulomb friction of a joint: a share of the load by gravity and Coriolis forces."""
     friction_law(sim, joint, lambda x, level: p["mu"] * abs(x.load))
 
 
@@ -101,9 +101,9 @@ def presliding(sim: SimulatedArm, joint: int, p: Parameters) -> None:
 
 
 class Dahl:
-    """Dahl friction, solved exactly along the path: ``z`` tends to the amplitude with the distance travelled.
+    """Dahl friction torque ``-z`` of a joint, integrated exactly: `z` tends to the amplitude with the distance travelled.
 
-    A step that the plant undoes is followed by a call for an earlier time; the law then restores the state of the previous call.
+    After a simulation step that is undone, the next call is for an earlier time; the state before the undone step is then restored.
     """
 
     def __init__(self, amplitude: float, stiffness: float) -> None:
@@ -133,7 +133,7 @@ def viscous_asymmetry(sim: SimulatedArm, joint: int, p: Parameters) -> None:
 
 @effect("gear_efficiency", lambda d: {"loss": d.between(0.03, 0.3)}, family="further", kinds=ANY)
 def gear_efficiency(sim: SimulatedArm, joint: int, p: Parameters) -> None:
-    """Let the share ``loss`` of a motor's torque be lost while it drives (``tau dq > 0``), none while it is driven."""
+    """Let the share ``loss`` of a motor's torque be lost while the motor drives the joint (``tau dq > 0``), none while the joint drives the motor."""
     torque_law(sim, joint, lambda x: -p["loss"] * x.tau if x.tau * x.dq > 0 else 0.0)
 
 
@@ -144,6 +144,6 @@ def gear_efficiency(sim: SimulatedArm, joint: int, p: Parameters) -> None:
     kinds=TWO_LINK,
 )
 def cross_friction(sim: SimulatedArm, joint: int, p: Parameters) -> None:
-    """Add friction ``level sgn(dq)`` with the other joint's velocity ``dq`` to a joint, as in wrists that share a gear."""
+    """Add friction ``level sgn(dq)`` to a joint of a two-link arm, with ``dq`` the other joint's velocity, as in wrists that share a gear."""
     other = 1 - joint
     torque_law(sim, joint, lambda x: -p["level"] * math.tanh(x.others[other][1] / 0.01))

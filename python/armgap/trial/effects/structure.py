@@ -1,4 +1,4 @@
-"""Hidden effects of the structure: masses, gravity, springs, stops, and external contacts."""
+"""Hidden effects of the structure: masses, gravity, springs, contacts, and external disturbances."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ def _draw_payload(d: Draw) -> Parameters:
 
 @effect("payload", _draw_payload, per_joint=False, kinds=ROTARY)
 def payload(sim: SimulatedArm, joint: int, p: Parameters) -> None:
-    """Add a point mass to the last link of a simulated arm."""
+    """Add a point mass ``mass`` [kg] to the last link of a simulated arm, at ``distance`` [m] from the link's joint."""
     sim.config.payload = (p["mass"], p["distance"])
 
 
 @effect("base_tilt", lambda d: {"angle": d.sign() * d.between(0.01, 0.15)}, per_joint=False, kinds=ROTARY)
 def base_tilt(sim: SimulatedArm, joint: int, p: Parameters) -> None:
-    """Tilt the base in the plane of motion: gravity acts as at ``q1 + angle``."""
+    """Tilt the base of a simulated arm in the plane of motion: gravity acts as at ``q1 + angle``."""
     sim.config.tilt += p["angle"]
 
 
@@ -36,19 +36,19 @@ def _draw_spring(d: Draw) -> Parameters:
 
 @effect("joint_spring", _draw_spring)
 def joint_spring(sim: SimulatedArm, joint: int, p: Parameters) -> None:
-    """Add a spring ``k (q - q0)`` to a joint, MuJoCo's joint stiffness."""
+    """Add a spring ``k (q - q0)`` to a joint, by MuJoCo's joint stiffness."""
     sim.config.spring[joint] = (p["k"], p["q0"], 0.0)
 
 
 def _draw_armature(d: Draw) -> Parameters:
-    # What joint 1 adds lies inside theta1: it must stand out from the trust in theta1.
+    # A rotor inertia of joint 1 only adds to theta1: it has to be larger than the standard deviation of theta1.
     low = 0.2 if d.joint == 0 else 0.04
     return {"inertia": d.inertia * d.between(low, 0.8)}
 
 
 @effect("rotor_inertia", _draw_armature)
 def rotor_inertia(sim: SimulatedArm, joint: int, p: Parameters) -> None:
-    """Add inertia on a joint's own acceleration, MuJoCo's armature."""
+    """Add inertia that acts on a joint's own acceleration only, by MuJoCo's armature."""
     sim.config.armature[joint] = p["inertia"]
 
 
@@ -76,7 +76,7 @@ def contact(sim: SimulatedArm, joint: int, p: Parameters) -> None:
 
 
 def _draw_pulse(d: Draw) -> Parameters:
-    # Both edges on the grid of internal steps, so that the impulse is exact.
+    # Both edges of the pulse lie on the grid of internal steps, so that the impulse is exact.
     grid = 2 * TIME_STEP
     return {
         "time": grid * round(d.uniform(0.1, 0.9) * d.use.duration / grid),
@@ -99,7 +99,7 @@ def _draw_hardening(d: Draw) -> Parameters:
 
 @effect("hardening_spring", _draw_hardening, family="further")
 def hardening_spring(sim: SimulatedArm, joint: int, p: Parameters) -> None:
-    """Add a spring ``k (q - q0) + cubic (q - q0)^3`` to a joint, MuJoCo's polynomial stiffness."""
+    """Add a spring ``k (q - q0) + cubic (q - q0)^3`` to a joint, by MuJoCo's polynomial stiffness."""
     sim.config.spring[joint] = (p["k"], p["q0"], p["cubic"])
 
 
@@ -110,7 +110,7 @@ def _draw_coupling(d: Draw) -> Parameters:
 
 @effect("rotor_coupling", _draw_coupling, per_joint=False, family="further", kinds=TWO_LINK)
 def rotor_coupling(sim: SimulatedArm, joint: int, p: Parameters) -> None:
-    """Add a geared rotor of joint 2 to link 1: energy ``inertia (dq1 + gear dq2)^2 / 2``, MuJoCo's tendon armature."""
+    """Add a geared rotor of joint 2 to link 1: energy ``inertia (dq1 + gear dq2)^2 / 2``, by MuJoCo's tendon armature."""
     sim.config.coupling = (p["inertia"], p["gear"])
 
 
@@ -120,7 +120,7 @@ def rotor_coupling(sim: SimulatedArm, joint: int, p: Parameters) -> None:
     family="further",
 )
 def cubic_drag(sim: SimulatedArm, joint: int, p: Parameters) -> None:
-    """Add cubic drag ``c3 dq^3`` to a joint, MuJoCo's cubic damping."""
+    """Add cubic drag ``c3 dq^3`` to a joint, by MuJoCo's cubic damping."""
     quadratic, cubic = sim.config.drag.get(joint, (0.0, 0.0))
     sim.config.drag[joint] = (quadratic, cubic + p["c3"])
 
@@ -134,5 +134,5 @@ def _draw_flexure(d: Draw) -> Parameters:
 
 @effect("link_flexibility", _draw_flexure, per_joint=False, family="outside")
 def link_flexibility(sim: SimulatedArm, joint: int, p: Parameters) -> None:
-    """Mount the outer part of the last link on a spring and damper: one more vibration mode."""
+    """Mount the outer part of the last link on a spring and damper, which adds one vibration mode."""
     sim.config.flexure = Flexure(p["stiffness"], p["damping"])

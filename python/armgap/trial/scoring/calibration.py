@@ -16,6 +16,7 @@ __all__ = ["EDGES", "Bin", "Calibration", "calibrate", "wilson"]
 
 #: Edges of the bins of probability; a probability on an edge belongs to the upper bin.
 EDGES = (0.0, 0.25, 0.5, 0.75, 0.9, 0.99, 1.0)
+#: Two-sided 95 % quantile of the normal distribution, in standard deviations.
 Z_95 = 1.96
 
 
@@ -39,9 +40,9 @@ class Calibration:
     bins : tuple of Bin
         Bins that are not empty.
     brier : float or None
-        Mean squared difference between probability and outcome; None without causes.
+        Brier score: mean squared difference between probability and outcome (0 or 1); None without causes.
     ece : float or None
-        Mean difference between probability and share right over the bins, weighted by their counts.
+        Expected calibration error: mean absolute difference of mean probability and share right over the bins, weighted by counts.
     """
 
     bins: tuple[Bin, ...]

@@ -1,4 +1,4 @@
-"""Score of one answer against one opened key."""
+"""Score of a method's answer to one case against the case's opened key."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ class CaseScore:
     Attributes
     ----------
     case, group, model, style : str
-        Name of the case, a key of :data:`GROUPS`, the machine, the style of motion of the first training log.
+        Name of the case, its group (a key of :data:`GROUPS`), its machine, and the style of motion of its first training log.
     hidden : tuple of (effect, joint)
-        Distinct hidden effects.
+        Hidden effects with their joints (from 1), without repeats.
     visible : float
         Prediction error by the least visible hidden effect as a multiple of the floor; see
         `armgap.trial.cases.visibility`.
@@ -47,7 +47,7 @@ class CaseScore:
     listed : bool
         Whether the answer is right, or a hidden effect is among the look-alikes of the first cause.
     found : int
-        Number of hidden effects among all named causes.
+        Number of hidden effects that a named cause equals or is equivalent to.
     located : bool, optional
         Whether the joint named for most of the gap is that of the hidden effects; None if no joint is named, or they have no single joint.
     verdict, error, seconds
@@ -74,7 +74,7 @@ class CaseScore:
 
     @property
     def extra(self) -> int:
-        """Number of named causes that are not hidden."""
+        """Number of named causes that are neither hidden effects nor equivalent to one."""
         return sum(not m for m in self.matches)
 
     @property
@@ -85,7 +85,7 @@ class CaseScore:
 
 
 def score_case(case: str, answer: Answer, key: Key) -> CaseScore:
-    """Score one answer; see :data:`GROUPS` for what counts as right."""
+    """Return the score of a method's answer to a case; the rules in :data:`GROUPS` define a right answer."""
     hidden, named = hidden_names(key), answer.causes
     matches = tuple(any(equivalent(n.name, h) for h in hidden) for n in named)
     group = _group(key, hidden)
@@ -117,7 +117,7 @@ def _located(answer: Answer, hidden: tuple[Name, ...], key: Key) -> bool | None:
 
 
 def hidden_names(key: Key) -> tuple[Name, ...]:
-    """Return distinct effects and joints of a key, in order."""
+    """Return the hidden effects of a key with their joints, in order and without repeats."""
     return tuple(dict.fromkeys((e.effect, e.joint) for e in key.effects))
 
 

@@ -1,7 +1,7 @@
 """Share of the gap that a method's model closes, against the best possible model: true effects with true sizes.
 
 Three models predict the holdout windows from their measured starts: the arm file as it is, the method's answer,
-and the true model by the key, as far as armgap can simulate it. The error of the true model is noise. Left out are effects with a
+and the true model by the key, as far as armgap can simulate it. The error of the true model is the noise floor. Left out are effects with a
 latent state at the start of a window: delays and lags of commands before the window, the deflection of springs,
 bristles and play. That armgap's true model predicts MuJoCo's logs to within noise is a test of the effects' equations.
 """
@@ -29,12 +29,13 @@ __all__ = ["HISTORY", "Closing", "closing", "model_error"]
 HISTORY = frozenset({"actuator_lag", "actuator_delay", "presliding", "joint_elasticity", "backlash"})
 #: Names of effects that act in one log of a case only.
 EVENTS = frozenset({"external_pulse"})
+#: Fixed-point iterations that invert the reading of an eccentric encoder.
 _STEPS = 20
 
 
 @dataclass(frozen=True)
 class Closing:
-    """RMS errors per joint on held-out windows: of the arm file, the answer, and the true model."""
+    """RMS prediction errors per joint [rad or m] on holdout windows: of the arm file (`before`), the answer (`after`), the true model (`best`)."""
 
     case: str
     before: tuple[float, ...]
@@ -50,7 +51,7 @@ class Closing:
 
     @property
     def ratio(self) -> float:
-        """RMS error of the answer over that of the true model, joints pooled."""
+        """Ratio of the RMS error of the answer to that of the true model, all joints together."""
         return math.hypot(*self.after) / math.hypot(*self.best)
 
 
@@ -74,7 +75,7 @@ def closing(folder: Path, answer: Answer, key: Key) -> Closing | None:
 
 
 def model_error(arm: Arm, theta: Array, windows: Sequence[Window], placed: Sequence[NativeEffect]) -> Array:
-    """Return the RMS error per joint of a model on windows, with starts corrected for the model's encoder errors."""
+    """Return the RMS prediction error per joint [rad or m] on windows whose initial states are corrected for the model's encoder errors."""
     lengths = () if arm.link_length is None else tuple(arm.link_length.tolist())
     error = misses(Mechanism(arm.kind, arm.gravity, lengths), theta, [_read(w, placed) for w in windows], placed)
     rms: Array = np.sqrt(np.mean(error**2, axis=(0, 1)))
@@ -87,7 +88,7 @@ def _simulable(placed: Sequence[NativeEffect]) -> bool:
 
 
 def _read(w: Window, placed: Sequence[NativeEffect]) -> Window:
-    """Return a window with its start state corrected for encoder errors."""
+    """Return a window whose initial state is corrected for encoder offset and eccentricity."""
     q, dq = w.q0.copy(), w.dq0.copy()
     for name, joint, p in placed:
         j = (joint or 1) - 1

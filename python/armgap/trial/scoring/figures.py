@@ -52,11 +52,11 @@ class Figures:
     method : str
         Name of the method.
     cases : tuple of CaseScore
-        Scores of all cases.
+        Scores of the method's answers, one per case.
     sizes : tuple of SizeScore
-        Sizes of rightly named causes.
+        Scores of the sizes of rightly named causes.
     bounds : tuple of BoundScore
-        Bounds of hidden effects that were called absent.
+        Scores of the bounds of hidden effects that were called absent.
     closings : tuple of Closing
         Prediction errors of arm file, answer and true model, for visible cases that can be simulated.
     version : str
@@ -72,7 +72,7 @@ class Figures:
 
     @property
     def visible(self) -> tuple[CaseScore, ...]:
-        """Cases with visible effects of the library, in which a cause has to be named."""
+        """Scores of the cases with visible effects of the library, in which a cause has to be named."""
         return tuple(c for c in self.cases if c.group in ("one effect", "two effects"))
 
     @property
@@ -82,7 +82,7 @@ class Figures:
 
     @property
     def quiet(self) -> tuple[CaseScore, ...]:
-        """Cases in which naming any cause is a false alarm."""
+        """Scores of the cases without hidden effects, in which any named cause is a false alarm."""
         return tuple(c for c in self.cases if c.group in ("no effect", "parameters only"))
 
     @property
@@ -92,18 +92,18 @@ class Figures:
 
     @property
     def confident(self) -> Share:
-        """Share of right causes among those named with confidence."""
+        """Share of right causes among those named with a probability of at least `CONFIDENT`."""
         sure = [m for c in self.cases for n, m in zip(c.named, c.matches, strict=True) if n.probability >= CONFIDENT]
         return Share(sum(sure), len(sure))
 
     @property
     def extra(self) -> float:
-        """Mean number of named causes per case that are not hidden."""
+        """Mean number per case of named causes that are neither hidden effects nor equivalent to one."""
         return _mean([c.extra for c in self.cases])
 
     @property
     def alike(self) -> float:
-        """Mean number of look-alikes listed with the first cause, per case with a cause."""
+        """Mean number of look-alikes listed with the first cause, per case with a named cause."""
         return _mean([len(c.named[0].look_alikes) for c in self.cases if c.named])
 
     @property
@@ -119,12 +119,12 @@ class Figures:
 
     @property
     def bounds_hold(self) -> Share:
-        """Share of 95 % bounds of effects called absent that hold for the hidden size."""
+        """Share of hidden effects called absent whose size is within the 95 % bound that was stated."""
         return Share(sum(b.holds for b in self.bounds), len(self.bounds))
 
     @property
     def closed(self) -> tuple[float, float] | None:
-        """Share of the gap that is closed, against the best possible model: median, and lower decile."""
+        """Median and lower decile over cases of the share that answers close of the gap above the true model's error; None without cases."""
         if not self.closings:
             return None
         shares = sorted(c.closed for c in self.closings)
@@ -132,7 +132,7 @@ class Figures:
 
     @property
     def ratio(self) -> tuple[float, float] | None:
-        """RMS error on the holdout over the true model's: median, and upper decile."""
+        """Median and upper decile over cases of the answer's RMS error on the holdout over the true model's; None without cases."""
         if not self.closings:
             return None
         ratios = sorted(c.ratio for c in self.closings)
@@ -156,7 +156,7 @@ class Figures:
     def by(
         self, key: Callable[[CaseScore], Iterable[str]], cases: Sequence[CaseScore] | None = None
     ) -> dict[str, Share]:
-        """Return shares of right cases by the labels that `key` gives a case."""
+        """Return the share of rightly answered cases for each label that `key` gives to cases."""
         found: dict[str, list[CaseScore]] = {}
         for case in self.cases if cases is None else cases:
             for name in key(case):
@@ -165,13 +165,13 @@ class Figures:
 
     @property
     def by_group(self) -> dict[str, Share]:
-        """Shares of right cases by group, in the groups' order."""
+        """Shares of rightly answered cases by group, in the order of :data:`GROUPS`."""
         found = self.by(lambda c: [c.group])
         return {group: found[group] for group in GROUPS if group in found}
 
     @property
     def by_band(self) -> dict[str, Share]:
-        """Shares of right cases by band of visibility of the hidden effects."""
+        """Shares of rightly answered cases by band of visibility of the hidden effects."""
         found = self.by(lambda c: [band(c.visible)], self.visible)
         return {name: found[name] for name in map(_band_name, range(len(BANDS))) if name in found}
 
@@ -242,7 +242,7 @@ def _answer_to(case: Path, method: str) -> Answer:
 
 
 def share(cases: Sequence[CaseScore]) -> Share:
-    """Return the share of right cases."""
+    """Return the share of rightly answered cases."""
     return Share(sum(c.right for c in cases), len(cases))
 
 

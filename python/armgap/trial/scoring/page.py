@@ -25,7 +25,7 @@ def page(all_figures: Sequence[Figures], manifest: Manifest | None, seal: str) -
     manifest : Manifest, optional
         Manifest of the cases.
     seal : str
-        Hash over all seals.
+        SHA-256 over the seals of all cases.
 
     Returns
     -------
@@ -246,7 +246,7 @@ def _method(all_figures: Sequence[Figures]) -> str:
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Return a Markdown table."""
+    """Return a Markdown table with the header `head` and rows of cells."""
     lines = [head, ["---"] * len(head), *rows]
     return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines)
 

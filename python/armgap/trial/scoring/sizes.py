@@ -72,7 +72,7 @@ class SizeScore:
 
 @dataclass(frozen=True)
 class BoundScore:
-    """Score of the bound on a hidden effect that was called absent."""
+    """Score of the bound on a hidden effect that was called absent: stated 95 % bound, and true size `truth` [SI]."""
 
     effect: str
     joint: int | None
@@ -86,7 +86,7 @@ class BoundScore:
 
 
 def size_scores(answer: Answer, key: Key) -> list[SizeScore]:
-    """Score the sizes of causes that name a hidden effect itself, not its look-alike."""
+    """Return scores of the sizes of causes that name a hidden effect itself, not its look-alike."""
     found = []
     for cause in answer.causes:
         hidden = [h for h in key.effects if (h.effect, h.joint) == cause.name]
@@ -96,7 +96,7 @@ def size_scores(answer: Answer, key: Key) -> list[SizeScore]:
 
 
 def bound_scores(answer: Answer, key: Key) -> list[BoundScore]:
-    """Check the bounds of hidden effects that were called absent, unless an equivalent was named in their place."""
+    """Return scores of the bounds of hidden effects that were called absent, without those for which an equivalent was named."""
     named = [c.name for c in answer.causes]
     found = []
     for h in key.effects:
@@ -114,13 +114,13 @@ def _size(cause: NamedCause, hidden: HiddenEffect) -> SizeScore:
     truth = _truth(hidden, key)
     stated, sigma = cause.sizes[key].value - NEUTRAL.get(cause.effect, 0.0), cause.sizes[key].sigma
     if key == "amplitude" and cause.effect == "torque_ripple":
-        stated, truth = abs(stated), abs(truth)  # the sign is in the phase
+        stated, truth = abs(stated), abs(truth)  # the sign of a ripple's amplitude can be moved into its phase
     return SizeScore(cause.effect, abs(stated - truth) / abs(truth), _covers(stated - truth, sigma))
 
 
 def _truth(hidden: HiddenEffect, key: str) -> float:
     """Return the hidden size as defined by armgap's library, less its neutral value."""
-    if hidden.effect == "rotor_coupling":  # the library states what the rotor adds off the diagonal
+    if hidden.effect == "rotor_coupling":  # the library's parameter is the inertia that the rotor adds off the diagonal
         return hidden.parameters["inertia"] * hidden.parameters["gear"]
     return hidden.parameters[key] - NEUTRAL.get(hidden.effect, 0.0)
 

@@ -23,7 +23,7 @@ class ActuatorBlock(Protocol):
 
 @dataclass
 class Delay:
-    """Delay block of an actuator: ``u(t - delay)``; the first command counts as held before its time."""
+    """Delay block of an actuator: ``u(t - delay)``, with `delay` in s; before the start the command equals the first one."""
 
     delay: float
     _past: deque[float] = field(default_factory=deque)
@@ -49,7 +49,7 @@ class Gain:
 
 @dataclass
 class DeadZone:
-    """Dead-zone block of an actuator: zero below ``level``, the excess above it."""
+    """Dead-zone block of an actuator: zero torque for commands below ``level`` [N m or N], the excess over the level above it."""
 
     level: float
 
@@ -71,7 +71,7 @@ class Saturation:
 
 @dataclass
 class Lag:
-    """First-order lag block of an actuator, with the exact mean over each step."""
+    """First-order lag block of an actuator with ``time_constant`` in s, which returns the exact mean over each step."""
 
     time_constant: float
     _y: float | None = None
@@ -86,7 +86,7 @@ class Lag:
 
 @dataclass
 class SlewLimit:
-    """Rate-limit block of an actuator: torque changes by no more than ``rate`` per second."""
+    """Rate-limit block of an actuator: the torque changes by no more than ``rate`` [N m/s or N/s]."""
 
     rate: float
     _y: float | None = None
@@ -100,7 +100,7 @@ class SlewLimit:
 
 @dataclass
 class MagneticHysteresis:
-    """Hysteresis block of an actuator, a rate-independent loop: a play of ``width`` behind a gain of ``share``."""
+    """Hysteresis block of an actuator: ``(1 - share) u + share z``, with `z` the command `u` behind a play of half width ``width`` [N m or N]."""
 
     width: float
     share: float
@@ -141,7 +141,7 @@ class Actuator:
 
 @dataclass
 class Encoder:
-    """Encoder of one joint, which reads ``q + a sin q + b cos q + offset`` rounded to whole steps."""
+    """Encoder of one joint, which reads ``q + a sin q + b cos q + offset`` [rad or m], rounded to whole steps of size ``step``."""
 
     step: float
     offset: float = 0.0

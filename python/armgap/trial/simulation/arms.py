@@ -1,8 +1,8 @@
 """Arms for blind trials: physical parameters, and random ones around known machines.
 
-The two-link arm follows Reyes and Kelly (1997), section 5: ``q1`` from hanging down, ``q2`` relative to link 1. Its
-base parameters come from its physical ones by the formulas of that section. Friction levels, torque limits and
-encoders are those of two real machines, a direct-drive arm (Table I of the paper) and a small geared arm, each spread
+The two-link arm follows Reyes and Kelly (1997), section 5: ``q1`` is zero hanging down, ``q2`` is relative to link 1.
+Base parameters come from physical ones by the formulas of that section. Friction levels, torque limits and
+encoders are those of two real machines, a direct-drive arm (Table I of the paper) and a small geared arm, each varied
 at random.
 """
 
@@ -13,7 +13,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-GRAVITY = 9.81  # m/s^2
+GRAVITY = 9.81  # acceleration of gravity, m/s^2
+#: One turn of a joint, rad.
 TURN = 2.0 * math.pi
 
 Numbers = tuple[float, ...]
@@ -37,8 +38,8 @@ class TrialArm:
         Encoder step, rad (m on an axis).
     sample_period : float
         Sample period [s].
-    slope : float
-        Inclination of an axis, rad; 0 is horizontal. Other kinds ignore it.
+    slope, gravity : float
+        Inclination of a linear axis, rad (0 is horizontal; other kinds ignore it), and acceleration of gravity [m/s^2].
     """
 
     kind: str
@@ -146,6 +147,7 @@ AXIS = TrialArm(
     step=(1e-6,),
 )
 
+#: Arms around whose parameters random arms are drawn, by name of the model.
 MODELS = {"direct-drive": DIRECT_DRIVE, "geared": GEARED, "pendulum": PENDULUM, "axis": AXIS}
 #: Sample periods that cases are drawn from, s.
 SAMPLE_PERIODS = (0.001, 0.002, 0.0025, 0.004, 0.005)

@@ -10,7 +10,7 @@ from armgap.errors import ArmgapError
 
 
 class TrialEngineMissingError(ArmgapError, ImportError):
-    """A package that blind trials need is not installed; diagnosing a log does not need it.
+    """Error: a package that blind trials need is not installed; diagnosing a log does not need it.
 
     Parameters
     ----------

@@ -15,8 +15,9 @@ import numpy as np
 from armgap.trial.simulation.arms import DIRECT_DRIVE, TrialArm
 from armgap.trial.simulation.simulated_arm import Array, CommandSource, Trace
 
+#: Styles of trial motions: open-loop multisine torques, torques of Reyes and Kelly (1997), and tracked random trajectories.
 STYLES = ("multisine", "paper", "tracked")
-#: Frequency above which a tracked motion has no content, Hz; commands above it show an oscillating controller.
+#: Frequency above which the reference of a tracked motion has no content, Hz; power of the command above it shows an oscillating controller.
 RINGING = 15.0
 #: Time over which torques and references of trial motions fade in, s.
 FADE_IN = 0.4
@@ -26,7 +27,7 @@ REVERSAL_RATE = 0.6
 
 @dataclass(frozen=True)
 class Multisine:
-    """Open-loop torque ``(1 - exp(-rate t)) bias + sum amplitude sin(omega t + phase)``, per joint, faded in.
+    """Motion under the open-loop torques ``(1 - exp(-rate t)) bias + sum amplitude sin(omega t + phase)``, whose sines fade in.
 
     Attributes
     ----------
@@ -46,7 +47,7 @@ class Multisine:
     limit: Array
 
     def source(self, arm: TrialArm) -> CommandSource:
-        """Return a function for the commanded torques over time."""
+        """Return a function for the commanded torques of the motion over time."""
 
         def command(t: float, _q: list[float]) -> list[float]:
             waves = np.sum(self.amplitude * np.sin(self.omega * t + self.phase), axis=1)
@@ -67,7 +68,7 @@ class Tracked:
     amplitude, omega, phase : ndarray, shape (n_joints, n_sines)
         Amplitudes [rad or m], angular frequencies [rad/s] and phases [rad] of the series.
     stiffness, damping, limit : ndarray, shape (n_joints,)
-        Controller gains and largest command, SI.
+        Gains of the PD controller [N m/rad, N m s/rad; N/m, N s/m on an axis] and largest command [N m or N].
     """
 
     centre: Array
@@ -87,7 +88,7 @@ class Tracked:
         return blend * wave, blend * rate + rise * wave
 
     def source(self, arm: TrialArm) -> CommandSource:
-        """Return a new controller that tracks the motion."""
+        """Return a new PD controller that tracks the motion: a function for commanded torques from time and positions."""
         last: list[Array] = []
 
         def command(t: float, q: list[float]) -> list[float]:
@@ -101,7 +102,7 @@ class Tracked:
         return command
 
     def softer(self) -> Tracked:
-        """Return the motion with a controller of half the stiffness."""
+        """Return the motion with a controller of half the stiffness and 0.6 times the damping."""
         return replace(self, stiffness=0.5 * self.stiffness, damping=0.6 * self.damping)
 
 
@@ -109,7 +110,7 @@ Excitation = Multisine | Tracked
 
 
 def rings(trace: Trace) -> bool:
-    """Whether a controller oscillates: most of a command's power is far above the frequencies of the reference."""
+    """Return whether the controller of a run oscillates: most of a command's power is above `RINGING`, where the reference has none."""
     tau = trace.tau - np.mean(trace.tau, axis=0)
     power = np.abs(np.fft.rfft(tau, axis=0)) ** 2
     frequency = np.fft.rfftfreq(len(trace.t), trace.t[1] - trace.t[0])
@@ -136,7 +137,7 @@ def draw_excitation(rng: np.random.Generator, arm: TrialArm, style: str, vigour:
 
 
 def acceptable(trace: Trace, arm: TrialArm) -> tuple[bool, float]:
-    """Return whether a motion is acceptable, and the factor by which to change its vigour if not."""
+    """Return whether a motion stays in range and moves every joint enough, and the factor for its amplitudes if not."""
     reach = np.max(np.abs(trace.q_true), axis=0)
     limit = np.array([0.9] if arm.kind == "axis" else [2.2, 2.8][: arm.n_joints])
     speed = np.quantile(np.abs(trace.dq_true), 0.95, axis=0)
@@ -195,7 +196,7 @@ def _multisine(rng: np.random.Generator, arm: TrialArm, vigour: float) -> Multis
 
 
 def _paper(rng: np.random.Generator, arm: TrialArm, vigour: float) -> Multisine:
-    """Return torques (31)-(32) of Reyes and Kelly (1997), scaled by the arm's gravity and inertia against those of Table I, random phases."""
+    """Return torques (31)-(32) of Reyes and Kelly (1997), scaled by the arm's gravity and inertia over those of Table I, with random phases."""
     gravity = _gravity(arm) / _gravity(DIRECT_DRIVE)
     inertia = np.array(arm.joint_inertia) / np.array(DIRECT_DRIVE.joint_inertia)
     jitter = rng.uniform(0.85, 1.15, (2, 2))

@@ -1,4 +1,4 @@
-"""The MuJoCo model of a :class:`~armgap.trial.simulation.plant.PlantConfig`, put together with ``MjSpec``."""
+"""Building of the MuJoCo model of a :class:`~armgap.trial.simulation.plant.PlantConfig` with ``MjSpec``."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def _set_spring(hinge: Any, config: PlantConfig, joint: int) -> None:
 
 
 def _set_mass(body: Any, mass: float, com: float, inertia: float) -> None:
-    moment = max(inertia, 1e-9)  # about y; x and z do not matter to a planar arm
+    moment = max(inertia, 1e-9)  # inertia about y; those about x and z do not matter to a planar arm
     body.mass, body.ipos, body.inertia = mass, [0.0, 0.0, -com], [moment, moment, moment]
     body.explicitinertial = True
 
@@ -111,7 +111,7 @@ def _tie_rotor(spec: Any, rotor: Rotor, joint: int, dt: float) -> None:
 
 
 def _add_flexible(mj: Any, body: Any, config: PlantConfig, flexure: Flexure) -> None:
-    """Split the last link so that it equals the nominal link when the flexure is stiff."""
+    """Split the last link into two bodies joined by the flexure; if the flexure is rigid, they equal the nominal link."""
     arm, last = config.arm, config.arm.n_joints - 1
     mass, com, inertia = arm.mass[last], arm.com[last], arm.inertia[last]
     share, slide = flexure.mass_share, arm.kind == "axis"

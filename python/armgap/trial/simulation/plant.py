@@ -1,4 +1,4 @@
-"""The arm in MuJoCo, stepped with dry friction that holds and reverses sharply.
+"""Simulation of a trial's arm in MuJoCo, with dry friction that holds a joint at rest and changes sign at the instant of a reversal.
 
 MuJoCo's ``frictionloss`` is a soft constraint, so its settings matter:
 
@@ -11,11 +11,11 @@ MuJoCo's ``frictionloss`` is a soft constraint, so its settings matter:
 
 Measured on the arm of Table I of Reyes and Kelly (1997) (joint 1 / joint 2): held at 95 % of its Coulomb level it creeps 0.08 / 0.47 urad in 1 s;
 windows of 0.25 s under the paper's torques end 0.09 / 0.33 urad RMS from an exact integration (encoder steps are 6.1 /
-9.6 urad). Without the cut steps these are 193 / 839 urad; with MuJoCo's default settings 7.1 / 31 mrad, and 3.4 / 19 mrad
-of creep.
+9.6 urad). Without the cut steps these errors are 193 / 839 urad RMS; with MuJoCo's default settings 7.1 / 31 mrad,
+and the creep is 3.4 / 19 mrad.
 
 Friction that varies (with speed, load, position, time) is set on ``dof_frictionloss`` before each step, at the state
-half a step ahead. Torque laws go to ``qfrc_applied``, at the same half step. Elasticity and play are a separate
+half a step ahead. Torque laws go to ``qfrc_applied``, at the same half step. Elasticity and play are modelled by a separate
 rotor body that a fixed tendon (spring and damper, or a limit) ties to the joint.
 """
 
@@ -36,12 +36,13 @@ REFINE = 8
 DEPTH = 4
 #: Speed below which a joint counts as standing, rad/s or m/s.
 STANDING = 1e-5
+#: Impedance of MuJoCo's soft constraints for dry friction and play: the largest that MuJoCo accepts.
 IMPEDANCE = 0.9999
 
 
 @dataclass
 class JointState:
-    """State of one joint half a step ahead, input of torque and friction laws [SI]."""
+    """State of one joint half a step ahead, for torque and friction laws [SI]: `load` is ``C dq + g``, `others` are (q, dq) of all joints."""
 
     t: float
     q: float
@@ -51,16 +52,18 @@ class JointState:
     others: list[tuple[float, float]]
 
 
+#: Function of a joint's state that returns an additional torque on the joint [N m or N].
 TorqueLaw = Callable[[JointState], float]
+#: Function of a joint's state and Coulomb friction level that returns an addition to the level [N m or N].
 FrictionLaw = Callable[[JointState, float], float]
 
 
 @dataclass
 class Rotor:
-    """A motor-side body tied to its joint by a spring (``stiffness``) or by play (``gap``).
+    """A body on the motor's side, tied to its joint by a spring and damper (``stiffness``, ``damping``) or by play (``gap``) [SI].
 
-    An additional rotor only turns (its inertia acts on its own acceleration); one that is ``part_of_link`` is taken
-    out of the link's inertia, so that the arm with the play closed is the nominal arm.
+    The inertia of an additional rotor acts on the rotor's own acceleration only; that of a rotor with ``part_of_link`` is
+    taken out of the link's inertia, so that the arm with the play closed is the nominal arm.
     """
 
     inertia: float
@@ -72,7 +75,7 @@ class Rotor:
 
 @dataclass
 class Flexure:
-    """Flexibility of the last link: its outer part is mounted on a spring and damper."""
+    """Flexibility of the last link: its outer part, with the share ``mass_share`` of the mass, is mounted on a spring and damper [SI]."""
 
     stiffness: float
     damping: float
@@ -90,7 +93,7 @@ class PlantConfig:
     payload : (mass, distance), optional
         Point mass on the last link, kg and m.
     armature : dict of joint to float
-        Inertia on the joint's own acceleration, kg m^2 (kg).
+        Inertia that acts on the joint's own acceleration only, kg m^2 (kg).
     spring : dict of joint to (k, q0, cubic)
         Torque ``-k (q - q0) - cubic (q - q0)^3``, N m (N), with `q` in rad (m).
     drag : dict of joint to (quadratic, cubic)
@@ -100,9 +103,9 @@ class PlantConfig:
     coupling : (rotor inertia, gear), optional
         Rotor of joint 2 on link 1, inertia in kg m^2, with the kinetic energy ``inertia (dq1 + gear dq2)^2 / 2``.
     torque_laws : dict of joint to list
-        Functions whose torque, N m (N), is added to the joint's.
+        Functions of the joint's state that return an additional torque, N m (N).
     friction_laws : dict of joint to list
-        Functions of the joint's Coulomb level so far that return an addition to it, N m (N).
+        Functions of the joint's state and of its Coulomb level so far that return an addition to the level, N m (N).
     """
 
     arm: TrialArm
@@ -154,11 +157,11 @@ class Plant:
         return float(self.data.time)
 
     def position(self) -> list[float]:
-        """Joint positions, rad (m on an axis)."""
+        """Return the joint positions, rad (m on an axis)."""
         return [float(self.data.qpos[i]) for i in self.dof]
 
     def velocity(self) -> list[float]:
-        """Joint velocities, rad/s (m/s on an axis)."""
+        """Return the joint velocities, rad/s (m/s on an axis)."""
         return [float(self.data.qvel[i]) for i in self.dof]
 
     def place(self, q: list[float], dq: list[float], t: float = 0.0) -> None:
@@ -172,7 +175,7 @@ class Plant:
         self._slope = [0.0] * self.n
 
     def hold(self, tau: list[float]) -> None:
-        """Advance by one sample period under constant torques, without state-dependent laws."""
+        """Advance the simulation by one sample period under constant torques, without state-dependent laws."""
         before = self._snapshot()
         self._drive(tau, self.dt)
         self._mj.mj_step(self.model, self.data, self.steps_per_sample)
@@ -184,7 +187,7 @@ class Plant:
             self._remember(before, self.dt * self.steps_per_sample)
 
     def step(self, tau: list[float]) -> None:
-        """Advance by one internal step under constant torques."""
+        """Advance the simulation by one internal step under constant torques."""
         self._step(tau, self.dt, DEPTH)
 
     def _step(self, tau: list[float], dt: float, depth: int) -> None:
@@ -224,7 +227,7 @@ class Plant:
     def _points(self, tau: list[float], dt: float) -> list[JointState]:
         q, dq = self.position(), self.velocity()
         ahead = [v + 0.5 * dt * a for v, a in zip(dq, self._slope, strict=True)]
-        # A joint that stands, or would turn round within half a step, is taken as it is.
+        # For a joint that stands, or would reverse within half a step, the present velocity is taken.
         ahead = [a if a * v > 0 and abs(v) > STANDING else v for a, v in zip(ahead, dq, strict=True)]
         half = [x + 0.5 * dt * v for x, v in zip(q, dq, strict=True)]
         states = list(zip(half, ahead, strict=True))
