@@ -103,7 +103,8 @@ class Fit:
     theta : ndarray, shape (n_parameters,)
         Estimated parameters [SI].
     share : ndarray, shape (n_joints,)
-        Mean square of each joint's residual, as a share of that of its torque or of the largest term of its equation of motion.
+        Mean square of each joint's residual, relative to that of its torque or of the largest term of its equation of motion, whichever is
+        larger; of `EquationError.with_factors` and `EquationError.of_torques` relative to that of the torque in any case.
     """
 
     theta: Array

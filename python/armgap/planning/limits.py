@@ -18,7 +18,8 @@ Array = NDArray[np.float64]
 
 #: Part of a limit that a reference motion may use, as the arm overshoots its reference, by a tenth if the drive is slow.
 MARGIN = 0.92
-#: Part of the torque limit that the feed-forward torque may use under the best model; the rest is left to the controller.
+#: Part of the torque limit that the feed-forward torque may use under the diagnosis' best model, re-estimated and with its causes; the rest is left
+#: to the controller.
 TORQUE_MARGIN = 0.8
 #: Part of the torque limit that the feed-forward torque may use under every model with an effect in question.
 TORQUE_MOST = 0.95

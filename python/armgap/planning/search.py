@@ -45,16 +45,16 @@ _POSES = ((0.5, 0.5), (0.3, 0.7), (0.8, 0.35))
 
 @dataclass(frozen=True)
 class Found:
-    """Result of a search for a motion.
+    """Best motion that a search found for the open questions of a diagnosis: whether an effect or its rival is in the arm.
 
     Attributes
     ----------
     motion : Motion
-        Motion with the most expected evidence for all questions.
+        Motion expected to settle the largest share of the questions.
     evaluations : int
         Number of motions tried.
     most : ndarray, shape (n_questions,)
-        Largest expected log-likelihood ratio of any motion tried, per question.
+        Largest expected log-likelihood ratio of effect and rival that any motion tried gave, per question.
     """
 
     motion: Motion

@@ -140,7 +140,7 @@ class Reproduction:
         }
 
     def to_json(self, indent: int | None = None) -> str:
-        """Return estimates, decomposition and findings of the reproduction as JSON."""
+        """Return the reproduction of Reyes and Kelly (1997) as JSON: estimates, causes of their deviations from the measured values, findings."""
         return json.dumps(self.to_dict(), indent=indent)
 
 

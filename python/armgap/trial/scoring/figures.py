@@ -21,7 +21,8 @@ __all__ = ["BANDS", "CONFIDENT", "Figures", "Share", "figures", "opened_keys"]
 
 #: Probability from which a cause counts as named with confidence.
 CONFIDENT = 0.9
-#: Bands of visibility: lower edges, as multiples of the floor.
+#: Lower edges of the bands in which cases are counted by the prediction error that their least visible hidden effect leaves after re-estimation, as a
+#: multiple of the noise floor. Effects in the first band are visible by the moved parameters only.
 BANDS = (0.0, 2.0, 10.0, 50.0, 250.0)
 
 

@@ -43,7 +43,8 @@ pub struct Fitted {
     weights: Vec<[Vec<f64>; 2]>,
 }
 
-/// Data of the linear fit of model errors and pulses, with the standard deviations that set its weights.
+/// Least-squares problem of one log: its residual torque as a sum of possible model errors and of Gaussian pulses (pushes), with the standard
+/// deviation of the residual torque at each joint and grid point, which sets the weights.
 pub struct Linear<'a, const N: usize> {
     /// Residual torque of the log with the columns of possible model errors.
     pub residual: &'a Residual<N>,

@@ -77,7 +77,8 @@ pub struct Residual<const N: usize> {
     pub joints: [Joint; N],
     /// Prior mean and standard deviation of the coefficient of every column of model errors.
     pub prior: Vec<(f64, f64)>,
-    /// Activity of the motion around each grid point: squared accelerations, speeds, torques and rates of torque, each relative to its mean.
+    /// Activity of the motion: for each joint the moving mean squares of torque, rate of torque, acceleration and speed, each relative to its mean
+    /// over the log. One series over the grid of times for each; those that are zero throughout are left out.
     pub activity: Vec<Vec<f64>>,
 }
 

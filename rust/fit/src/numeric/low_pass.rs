@@ -8,7 +8,8 @@ pub struct LowPass {
     pub grid: Vec<f64>,
     /// Spacing of the grid, s.
     pub step: f64,
-    /// For every grid point, the index of the first sample within four standard deviations, and the weights of the samples from that one on.
+    /// Kernel of each grid point: the index of the first sample within four standard deviations of the Gaussian from the grid point's time, and the
+    /// weights of the samples from that one on.
     pub kernels: Vec<(usize, Vec<f64>)>,
 }
 

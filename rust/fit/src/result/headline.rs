@@ -1,6 +1,7 @@
-//! Choice of the causes that a diagnosis names, by their size, value and probability, as many as are allowed. The rest are listed as candidates.
+//! Choice of the causes that a diagnosis names: probable enough, with values that arms can have and sizes distinct from zero, and no more than
+//! allowed. All others are listed as candidates, with reasons.
 //!
-//! The model reported has the named causes only, so that the gap "after" is what a reader who applies them gets.
+//! The reported model has the named causes only, so that its gap is the one a reader gets who adds these causes to a simulation.
 
 use crate::disturbance::push::{Conclusion, Disturbance};
 use crate::likelihood::context::{DiagnosisContext, SplitWeighting};

@@ -43,7 +43,7 @@ pub enum Kind {
 /// A re-estimated parameter that is not to be believed as it stands.
 #[derive(Debug, Clone, PartialEq, JsonSchema, Serialize)]
 pub struct Sanity {
-    /// Name of the parameter.
+    /// Name of the parameter whose re-estimated value is not to be believed.
     pub parameter: &'static str,
     /// Reason why the re-estimated value of the parameter is not to be believed.
     pub kind: Kind,
