@@ -21,7 +21,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 VALGRIND_SAMPLES, STEP_SAMPLES = 600, 200
-# Number of first samples that are left out, in which an estimator starts.
+# Number of first samples that are left out, as the estimator does not update in each of these.
 START = 3
 SCHEMES = ("filtered-dynamic", "supplied-energy", "filtered-power")
 FORMS = ("plain", "factorized")

@@ -1,7 +1,7 @@
 """Times of armgap's estimator and simulation and of well-known packages, with ratios and differences of results. Markdown on standard output.
 
 Estimation: filtered power with the filters of Reyes and Kelly (1997) on their run; other packages get regressor rows filtered by numpy
-and scipy, so they do less. Simulation: two seconds of the arm without dry friction; differences are to scipy's DOP853 at 1e-12.
+and scipy, so they do less work. Simulation: two seconds of the arm without dry friction; differences are to scipy's DOP853 at 1e-12.
 """
 
 from __future__ import annotations

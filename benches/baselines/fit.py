@@ -29,7 +29,7 @@ from armgap import Arm, identify, seed_torque, simulate
 TRUTH = np.array([2.3516, 0.0838, 0.1019, 38.465, 1.827, 2.288, 0.175, 7.6095, 1.734])
 START = TRUTH * (1.0 + 0.2 * np.resize([1.0, -1.0], 9))
 SAMPLES, WINDOW = 4000, 100
-#: Number of windows of which the slowest solver is given one.
+#: Number of windows out of which the slowest solver is given only one.
 FEW = 8
 #: Width of the smooth sign of the velocity for solvers that cannot take a jump of friction [rad/s].
 SMOOTHING = 0.01
@@ -59,7 +59,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Fit:
-    """Result of one package: parameters, time [s], and number of rollouts where it does any."""
+    """Result of one package: parameters, time [s], and number of rollouts; None for a package that does none."""
 
     theta: np.ndarray
     seconds: float

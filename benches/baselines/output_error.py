@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 HERE = Path(__file__).parent
-#: Relative step of forward differences, as in armgap's fit; scipy's default of 1.5e-8 is too short beside events located to 1e-10.
+#: Relative step of forward differences, as in armgap's fit; scipy's default of 1.5e-8 is too short, as events are located to 1e-10 only.
 STEP = 1e-6
 
 

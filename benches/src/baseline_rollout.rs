@@ -43,8 +43,8 @@ unsafe extern "C" {
     );
 }
 
-/// Positions, rad, after every period of `h` seconds, from positions and velocities `x`, under held torques, N m, two for each period; with dry friction, or,
-/// if `theta` has none, without friction modes.
+/// Writes into `q` the positions, rad, after every period of `h` seconds, from positions and velocities `x`, under held torques `tau`, N m, two for
+/// each period; with dry friction, or, if `theta` has none, without friction modes.
 pub fn rollout(build: Build, theta: &[f64; 9], x: &[f64; 4], tau: &[f64], h: f64, q: &mut [f64]) {
     let dry = theta[7] > 0.0 || theta[8] > 0.0;
     let function: Rollout = match (build, dry) {

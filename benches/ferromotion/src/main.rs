@@ -1,5 +1,5 @@
-//! Times of two seconds of the two-link arm without dry friction, by Runge-Kutta with one step per period: `armgap-core`'s, and one around
-//! ferromotion's articulated-body algorithm. Markdown on standard output.
+//! Times of two seconds of the two-link arm without dry friction, by Runge-Kutta with one step per period: by the integrator of `armgap-core`, and by
+//! one that calls ferromotion's articulated-body algorithm. Markdown on standard output.
 
 use armgap_bench::run::{PERIOD, torque};
 use armgap_core::arm::{LinkParameters, TwoLink};

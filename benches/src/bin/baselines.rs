@@ -17,7 +17,7 @@ use std::io::Write;
 use std::time::Instant;
 
 const ROUNDS: usize = 301;
-/// Relative difference of the estimates of `armgap-core` and plain C beyond which their work was not equal.
+/// Relative difference of the estimates of `armgap-core` and plain C above which their work counts as not equal.
 const SAME: f64 = 1e-9;
 
 /// Parameters estimated by `armgap-core` over the whole run.
@@ -52,7 +52,8 @@ const COLUMNS: [&str; 7] = [
     "factorized f32",
 ];
 
-/// Median times per sample, ns, one per column, and the largest relative difference of estimates between plain C and `armgap-core` in double precision.
+/// Median times per sample, ns, for each column, and the largest relative difference of estimates between plain C and `armgap-core` in double
+/// precision.
 fn compare(scheme: Scheme, variant: Variant) -> ([f64; COLUMNS.len()], f64) {
     let (double, single) = (readings::<f64>(), readings::<f32>());
     let arrays = Arrays::of(&samples::<f64>());

@@ -12,7 +12,8 @@ use std::time::Instant;
 const STATES: usize = 4096;
 const REPEATS: usize = 30;
 
-/// Shortest time per pass of a loop body, ns. A macro: a closure would not be compiled for the instructions of its surroundings.
+/// Shortest time per pass of a loop body, ns. It is a macro because a closure would not be compiled for the instruction set of the function around
+/// it.
 macro_rules! shortest {
     ($i:ident, $body:block) => {{
         let mut shortest = f64::INFINITY;

@@ -19,7 +19,7 @@ use std::time::Instant;
 
 const SAMPLES: usize = 2000;
 const ROUNDS: usize = 31;
-/// Difference of the estimates of `armgap-core` and plain C, relative to the largest estimate, beyond which their work was not equal.
+/// Difference of the estimates of `armgap-core` and plain C, relative to the largest estimate, above which their work counts as not equal.
 const SAME: f64 = 1e-8;
 
 const COLUMNS: [&str; 5] = ["C -O3", "C -O3 -march=native", "plain", "factorized", "plain, without AVX2"];

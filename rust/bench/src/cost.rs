@@ -2,7 +2,7 @@
 //!
 //! Every call is timed on its own, less the time of reading the clock; the typical time comes from whole runs, in which the clock is read once. The
 //! noise is measured by fixed arithmetic: the time by which the slowest call of the arithmetic exceeds its typical call is due to the machine
-//! (interrupts, other programs), and the estimator's slowest sample includes as much of it.
+//! (interrupts, other programs), and the estimator's slowest sample includes about as much noise.
 
 use crate::run::{PERIOD, arm, samples};
 use armgap_core::filter::Cutoff;

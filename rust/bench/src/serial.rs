@@ -11,7 +11,8 @@ pub const JOINTS: usize = 7;
 /// Rotor inertia, kg m^2, viscous, N m s/rad, and Coulomb coefficient, N m, of each joint of the serial arm.
 const DRIVE: [f64; 3] = [0.3, 0.8, 1.5];
 
-/// Serial arm like one of six or seven axes: successive axes perpendicular, links of a third of a metre; with the inertial parameters of its links.
+/// Serial arm of `N` revolute joints, similar to arms of six or seven axes: successive axes perpendicular, links of a third of a metre; with the
+/// inertial parameters of its links.
 pub fn arm<const N: usize>() -> (Chain<f64, N>, [[f64; 10]; N]) {
     let joints = std::array::from_fn(|j| {
         let across = [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]];

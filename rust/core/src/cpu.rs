@@ -1,18 +1,19 @@
 //! Choice of the processor's instructions that the online estimator uses, made when the estimator is made.
 //!
-//! One Python wheel and one library run on every x86-64 processor, while four doubles at once and `a b + c` with one rounding take a
-//! third off the cost of a sample. So the hot code is written once over a [`Cpu`] and compiled twice on x86-64: for every processor, and
-//! for processors with AVX2 and FMA. A [`Level`] says which, and one call without a branch in between enters the code.
+//! One Python wheel and one library run on every x86-64 processor, while four doubles at once and `a b + c` with one rounding reduce the computing
+//! time of a sample by a third. So the hot code is written once, generic over a [`Cpu`], and compiled on x86-64 for every processor, for processors
+//! with AVX2 and FMA, and for [`Level::run_wide`] also for AVX-512. A [`Level`] says which version runs, and one call without a branch in between
+//! enters the code.
 //!
-//! `a b + c` goes through [`Cpu::fused`], because a compiler does not join the two on its own, and because the standard library's
-//! `mul_add` is a function call where the instruction is missing. Everything below [`Kernel::run`] has to be inlined: a function that
-//! stays outside is compiled for every processor.
+//! `a b + c` goes through [`Cpu::fused`], because a compiler does not fuse product and sum on its own, and because the standard library's `mul_add`
+//! is a function call where the instruction is missing. Everything below [`Kernel::run`] has to be inlined: a function that stays outside is compiled
+//! for every processor.
 //!
 //! Without the feature `std` only the instructions of the builder's `target-cpu` are used, and there is no unsafe code.
 
 use crate::real::Real;
 
-/// Arithmetic of one kind of processor.
+/// Kind of processor that code is compiled for, as a type parameter: vector width and fused multiply-add.
 pub trait Cpu: Copy {
     /// Number of doubles that a vector instruction of the processor takes together.
     const DOUBLES: usize;
@@ -21,7 +22,7 @@ pub trait Cpu: Copy {
     fn fused<T: Real>(a: T, b: T, c: T) -> T;
 }
 
-/// Any processor that the code was compiled for.
+/// Processor that offers no more than the instructions of the compilation target.
 #[derive(Debug, Clone, Copy)]
 pub struct Portable;
 
@@ -54,11 +55,12 @@ pub trait Kernel {
     /// Type of the result of the computation.
     type Output;
 
-    /// Runs the computation; the implementation, and all it calls that has to be fast, must be `#[inline(always)]`.
+    /// Runs the computation with the instructions of the processor `C`; the implementation, and all it calls that has to be fast, must be
+    /// `#[inline(always)]`.
     fn run<C: Cpu>(self) -> Self::Output;
 }
 
-/// Instruction set that code may use.
+/// Instruction set that kernels are run with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Level(InstructionSet);
 
@@ -68,7 +70,7 @@ enum InstructionSet {
     /// AVX2 and FMA; made by [`Level::detect`] alone, where the processor has both.
     #[cfg(all(feature = "std", target_arch = "x86_64"))]
     Avx2,
-    /// AVX-512 besides AVX2; made by [`Level::widest`] alone, where the processor has both.
+    /// AVX-512 in addition to AVX2 and FMA; made by [`Level::widest`] alone, where the processor has all three.
     #[cfg(all(feature = "std", target_arch = "x86_64"))]
     Avx512,
 }
@@ -77,13 +79,14 @@ impl Level {
     /// Instruction set that the code was compiled for.
     pub const PORTABLE: Self = Self(InstructionSet::Portable);
 
-    /// AVX2 and FMA where the processor has both, else, or without the standard library, [`Level::PORTABLE`].
+    /// Level of AVX2 and FMA where the processor has AVX2, FMA and ADX, else, or without the standard library, [`Level::PORTABLE`].
     #[inline]
     pub fn detect() -> Self {
         #[cfg(all(feature = "std", target_arch = "x86_64"))]
         if std::arch::is_x86_feature_detected!("avx2")
             && std::arch::is_x86_feature_detected!("fma")
-            // All have it but the first with AVX2 and the one that valgrind plays, which does not know every form of AVX's instructions.
+            // Processors with AVX2 have ADX too, except the first generation and the one that valgrind emulates, which does not know every form of
+            // the AVX instructions.
             && std::arch::is_x86_feature_detected!("adx")
         {
             return Self(InstructionSet::Avx2);
@@ -91,7 +94,7 @@ impl Level {
         Self::PORTABLE
     }
 
-    /// AVX-512, eight doubles at once, where the processor has it, else [`Level::detect`]; for kernels run by [`Level::run_wide`].
+    /// Level of AVX-512, eight doubles at once, where the processor has it, else [`Level::detect`]; for kernels run by [`Level::run_wide`].
     #[inline]
     pub fn widest() -> Self {
         #[cfg(all(feature = "std", target_arch = "x86_64"))]

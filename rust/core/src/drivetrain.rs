@@ -28,8 +28,8 @@ impl<T: Real, const N: usize> Drivetrain<T, N> {
         Self { of: [None; N], sides: [Sides::LINK; N], any: false, has_backlash: false, brakes_motors: false }
     }
 
-    /// Puts a transmission on joint `j`, and takes the rotor's inertia out of `inertia` if it is part of the link's; `None` without such a
-    /// joint.
+    /// Puts a transmission on joint `j`, and subtracts its rotor from the inertia matrix `inertia` if the rotor is a part of the link's nominal
+    /// inertia; `None` if there is no joint `j`.
     pub(crate) fn add(
         &mut self,
         j: usize,
@@ -45,7 +45,7 @@ impl<T: Real, const N: usize> Drivetrain<T, N> {
         Some(())
     }
 
-    /// Sets where encoder and friction of joint `j` sit, which matters only with a transmission; `None` without such a joint.
+    /// Sets where encoder and friction of joint `j` sit, which matters only with a transmission; `None` if there is no joint `j`.
     pub(crate) fn set_sides(&mut self, j: usize, sides: Sides) -> Option<()> {
         *self.sides.get_mut(j)? = sides;
         self.brakes_motors |= sides.friction_at_motor;
@@ -121,7 +121,7 @@ impl<T: Real, const N: usize> Drivetrain<T, N> {
         self.of.get(j)?.as_ref()
     }
 
-    /// Joints that have a transmission, by index, with it.
+    /// Index and transmission of each joint that has a transmission.
     #[inline]
     pub fn iter(&self) -> impl Iterator<Item = (usize, &Transmission<T>)> {
         self.of.iter().enumerate().filter_map(|(j, transmission)| Some((j, transmission.as_ref()?)))
@@ -169,7 +169,7 @@ impl<T: Real, const N: usize> Drivetrain<T, N> {
         }
     }
 
-    /// Accelerations of the transmissions' deflections for the motor torques `tau` and the joint accelerations `ddq`, SI.
+    /// Accelerations of the transmissions' deflections, rad/s^2 (m/s^2), for motor torques `tau`, N m (N), and joint accelerations `ddq`.
     #[inline]
     pub(crate) fn deflection_accelerations(
         &self,
@@ -189,8 +189,8 @@ impl<T: Real, const N: usize> Drivetrain<T, N> {
         deflection_acceleration
     }
 
-    /// Force by which the flank of joint `j`'s closed backlash would have to pull, N m (N); positive where the backlash opens. `None` if it is
-    /// not closed.
+    /// Force by which the flank of joint `j`'s closed backlash would have to pull, N m (N); positive where the backlash opens. `None` if the joint
+    /// has no closed backlash.
     #[inline]
     pub(crate) fn flank_tension(
         &self,
@@ -206,7 +206,8 @@ impl<T: Real, const N: usize> Drivetrain<T, N> {
         )
     }
 
-    /// Depth of joint `j`'s rotor behind the nearer flank of its open backlash, rad or m, negative between the flanks. `None` if it is not open.
+    /// Depth of joint `j`'s rotor behind the nearer flank of its open backlash, rad or m, negative between the flanks. `None` if the joint has no
+    /// open backlash.
     #[inline]
     pub(crate) fn depth(&self, j: usize, latent: &LatentState<T, N>) -> Option<T> {
         let transmission = self.get(j).filter(|d| d.backlash > T::zero())?;
@@ -214,8 +215,8 @@ impl<T: Real, const N: usize> Drivetrain<T, N> {
         open.then(|| latent.deflection[j].abs() - transmission.half_backlash())
     }
 
-    /// Plastic impact of joint `j`'s rotor on the nearer flank of its backlash, in an arm of this `inertia`: velocities and deflection rates
-    /// jump.
+    /// Plastic impact of joint `j`'s rotor on the nearer flank of its backlash, in an arm with the inertia matrix `inertia`: velocities `dq` and
+    /// deflection rates jump.
     pub(crate) fn impact(
         &self,
         j: usize,

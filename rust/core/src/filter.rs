@@ -1,6 +1,6 @@
 //! The first-order filters `F(s) = lambda/(s + lambda)` and `D(s) = lambda s/(s + lambda)` at sample times.
 //!
-//! Two pairs, with `a = exp(-h lambda)`:
+//! Two discretisations of the pair `F`, `D`, with `a = exp(-h lambda)`:
 //!
 //! * **paper**, as printed by Reyes and Kelly (1997), section 5.1: `F(z) = (1 - a) z^-1 / (1 - a z^-1)` and
 //!   `D(z) = lambda (1 - z^-1) / (1 - a z^-1)`. Their ratio is `lambda (z - 1)/(1 - a)` where a derivative has `(z - 1)/h`: an output of `D`
@@ -10,9 +10,9 @@
 //!   for them `D` also takes the value half-way, because a chord lies above a convex curve at every sample, which adds up to a bias.
 //!
 //! Configuration ([`Cutoff`], [`FilterCoefficients`]) and state (one output per channel, the caller's) are separate, so one step's coefficients drive
-//! any number of channels; [`CachedCoefficients`] keeps them while the interval stays the same.
-//! Starting values: with `D` started in the steady state of its first input and every `F` of the same equation from zero, an equation
-//! `y = dp/dt + b` holds for the filtered signals from the first sample on, whatever the motion at that time.
+//! any number of channels; [`CachedCoefficients`] keeps the coefficients while the length of the interval stays the same. Starting values: with `D`
+//! started in the steady state of its first input and every `F` of the same equation from zero, an equation `y = dp/dt + b` holds for the filtered
+//! signals from the first sample on, whatever the motion at that time.
 
 use crate::cpu::Cpu;
 use crate::real::{Real, lit};
@@ -82,8 +82,8 @@ impl<T: Real> FilterCoefficients<T> {
         C::fused(self.last, to, C::fused(self.decay, y, self.first * from))
     }
 
-    /// Output of the low-pass filter `F` one interval after its output `y`, for a parabola from `from` to `to` that lies `height` above its chord at
-    /// the middle.
+    /// Output of the low-pass filter `F` one interval after its output `y`, for an input that is a parabola from `from` to `to` and lies `height`
+    /// above its chord at the middle.
     #[inline(always)]
     pub fn curve<C: Cpu>(&self, y: T, from: T, to: T, height: T) -> T {
         C::fused(self.bulge, height, self.ramp::<C>(y, from, to))

@@ -24,7 +24,7 @@ pub struct Instant<'a, V, const N: usize> {
 
 /// Dynamics of an arm with its friction and effects, or of several arms side by side.
 pub trait Dynamics<V: Number, const N: usize> {
-    /// Rotations by which the arm's angles change when the joints move by `by`, rad or m, and the largest of the angles, rad.
+    /// Rotations by which the arm's angles change when the joints move by `by`, rad or m, and the largest absolute rotation angle, rad.
     fn rotations(&self, by: &[V; N], reach: AngleRange) -> ([Rotation<V>; N], V);
 
     /// Kinematic state at the joint state `joints`, given the sines and cosines of the arm's angles.
@@ -93,9 +93,9 @@ pub struct Span<V, const N: usize> {
 /// Check of the assumed friction modes after a step, with the quantities from which the changed mode is found.
 #[derive(Debug, Clone, Copy)]
 pub struct ModeCheck<V, const N: usize> {
-    /// > 0 or NaN if the motion contradicts an assumed friction mode, or if `range_violation` is > 0 or NaN.
+    /// Mode violation: > 0 or NaN if the motion contradicts an assumed friction mode, or if `range_violation` is > 0 or NaN.
     pub mode_violation: V,
-    /// > 0 or NaN if the motion is not finite or turns the arm beyond the angle range of one step.
+    /// Violation of the angle range: > 0 or NaN if the motion is not finite or turns the arm beyond the angle range of one step.
     pub range_violation: V,
     /// Joint accelerations, rad/s^2 (m/s^2), at the start of the step and, as the last Runge-Kutta stage has them, at the end.
     pub ddq: [[V; N]; 2],
@@ -143,7 +143,7 @@ fn motion<V: Number, B: Dynamics<V, N>, const N: usize>(
     let generalized_force = dynamics.generalized_force(at, &modes.direction);
     let (mut inertia, mut right) = (at.kinematics.equation_terms.inertia, generalized_force);
     if dynamics.any_stuck(modes) {
-        // What does not push a stuck joint and is not coupled to it leaves it at rest.
+        // A stuck joint without generalized force and without inertial coupling has the acceleration zero.
         for i in 0..N {
             right[i] = right[i] * modes.slides[i];
             for j in 0..i {
@@ -202,10 +202,10 @@ fn times<V: Number, const N: usize>(x: V, y: &[V; N]) -> [V; N] {
     product
 }
 
-/// > 0 if a joint's velocity `dq`, or at rest its acceleration `ddq`, contradicts the `direction` of its friction mode.
+/// Contradiction of a joint's motion and friction mode: > 0 if its velocity `dq`, or at rest its acceleration `ddq`, contradicts `direction`.
 #[inline(always)]
 pub(crate) fn contradiction<V: Number>(dq: V, ddq: V, direction: V, slides: V) -> V {
-    // A joint that was just released stays at rest only if it is pulled back; `slides` is 1 there.
+    // A joint at rest whose mode is sliding (`slides` is 1) has just been released: the mode is wrong if it accelerates against `direction`.
     let released = -(ddq * direction) * slides;
     dq.where_zero(released, dq.size() - dq * direction)
 }
@@ -322,7 +322,7 @@ fn end<V: Number, B: Dynamics<V, N>, const N: usize>(
     let sixth = span.h * c(1.0 / 6.0);
     let ddq = [s1.ddq, s4.motion.ddq];
     for j in 0..N {
-        // The velocities of the stages are `dq` and half, half and all of a step at the accelerations before.
+        // The velocities of the stages are `dq`, and `dq` plus 1/2, 1/2 and 1 steps at the acceleration of the stage before.
         let early = s1.ddq[j] + s2.motion.ddq[j] + s3.motion.ddq[j];
         by[j] = span.h * sixth * (-c(3.0)).fused(s2.motion.ddq[j], early);
         end.q[j] = span.h.fused(sixth.fused(early, joints.dq[j]), joints.q[j]);
@@ -332,7 +332,7 @@ fn end<V: Number, B: Dynamics<V, N>, const N: usize>(
     }
     let (aside, last) = dynamics.rotations(&by, AngleRange::Slight);
     let kinematics = dynamics.rotated(&end, rotated(&s4.kinematics.sincos, &aside));
-    // An acceleration that is not finite leaves its mark in this.
+    // NaN if an acceleration, and so a velocity at the end of the step, is not finite; else zero.
     let finite = sum * c(0.0);
     let far = AngleRange::Slight.part(aside_far.larger(last)).larger(far) - c(1.0) + finite;
     (mode_check.mode_violation, mode_check.range_violation, mode_check.ddq) =

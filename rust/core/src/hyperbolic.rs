@@ -9,13 +9,13 @@ use crate::real::lit;
 /// Argument beyond which the hyperbolic tangent is 1 in double precision.
 const LARGEST: f64 = 20.0;
 
-/// Number of doublings.
+/// Number of doublings of the argument, which is first divided by `2^DOUBLINGS`.
 const DOUBLINGS: i32 = 5;
 
-/// Numerator of the fraction over its argument, in powers of the squared argument.
+/// Coefficients of the numerator, divided by `y`, of Lambert's continued fraction for `tanh y`, in powers of `y^2`.
 const NUMERATOR: [f64; 5] = [34_459_425.0, 4_729_725.0, 135_135.0, 990.0, 1.0];
 
-/// Denominator of the fraction, in powers of the squared argument.
+/// Coefficients of the denominator of Lambert's continued fraction for `tanh y`, in powers of `y^2`.
 const DENOMINATOR: [f64; 5] = [34_459_425.0, 16_216_200.0, 945_945.0, 13_860.0, 45.0];
 
 /// Hyperbolic tangent of `x`.

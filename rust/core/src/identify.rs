@@ -155,7 +155,7 @@ impl<T: Real, A: Arm<T, N, P>, S: Columns<T, N, P, R>, const N: usize, const P: 
         self
     }
 
-    /// Changes the instruction set; the default is the widest that the processor has.
+    /// Changes the instruction set that samples are processed with; the default is [`Level::detect`].
     pub fn with_level(mut self, level: Level) -> Self {
         self.rls = self.rls.with_level(level);
         self
@@ -222,7 +222,7 @@ impl<T: Real, A: Arm<T, N, P>, S: Columns<T, N, P, R>, const N: usize, const P: 
         outcome
     }
 
-    /// Whether a sample can be used: finite, of possible size, later than the last sample, and reachable from it.
+    /// Whether a sample can be used: finite, of possible size, later than the last sample, and reachable from its position at a possible speed.
     #[inline(always)]
     fn acceptable(
         &self,
@@ -245,7 +245,7 @@ impl<T: Real, A: Arm<T, N, P>, S: Columns<T, N, P, R>, const N: usize, const P: 
         fine
     }
 
-    /// Starts the scheme at a state. Arguments are copied, so that hot code can keep its own in registers.
+    /// Starts the regression model (scheme) at the state `now`. Arguments are copied, so that hot code can keep its own in registers.
     #[cold]
     #[inline(never)]
     fn start(&mut self, now: Snapshot<T, N>, tau: SVector<T, N>) {
@@ -277,7 +277,7 @@ impl<T: Real, A: Arm<T, N, P>, S: Columns<T, N, P, R>, const N: usize, const P: 
                 SampleInterval { h, split: h * half, first: past.tau, second: past.tau, middle: between };
             (now, interval, *tau)
         } else {
-            // The state half-way between the two samples; on the way there from the one before, the torque changed at the last sample.
+            // State half-way between the last sample and this one; since the half-way state before it, the torque has changed at the last sample.
             let (now, held, split) = (Snapshot { q: between, dq: difference }, past.tau, past.h * half);
             if past.seen == Seen::One {
                 self.start(now, held);
@@ -322,7 +322,7 @@ impl<T: Real, A: Arm<T, N, P>, S: Columns<T, N, P, R>, const N: usize, const P: 
             }
         };
         if outcome == Outcome::Rejected {
-            // Filters and integrals hold what least squares cannot use; the equations hold from any start.
+            // Filters and integrals contain values that least squares cannot use; the regression equations are valid from any initial state.
             self.start(*now, *tau);
         }
         outcome

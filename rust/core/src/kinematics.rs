@@ -42,7 +42,7 @@ impl<V: Number, A: Arm<V::Real, N, P>, const N: usize, const P: usize> RigidArm<
         self.rotated(joints, sincos)
     }
 
-    /// Rotations by which the arm's angles change when the joints move by `by`, rad or m, and the largest of the angles, rad.
+    /// Rotations by which the arm's angles change when the joints move by `by`, rad or m, and the largest absolute rotation angle, rad.
     #[inline(always)]
     pub fn rotations(&self, by: &[V; N], reach: AngleRange) -> ([Rotation<V>; N], V) {
         // Adding -0 is the one sum that a compiler may leave out.
@@ -65,8 +65,8 @@ impl<V: Number, A: Arm<V::Real, N, P>, const N: usize, const P: usize> RigidArm<
 }
 
 impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> RigidArm<T, A, N, P> {
-    /// Kinematic state at the joint state `joints`, from sines and cosines known at the positions `q` if the angles between are within the range
-    /// `reach`.
+    /// Kinematic state at the joint state `joints`, from sines and cosines known at the positions `q` if the angles between `q` and the joint state
+    /// are within the range `reach`.
     #[inline(always)]
     pub fn near(
         &self,
@@ -136,7 +136,7 @@ pub fn rotated<V: Number, const N: usize>(sincos: &[SinCos<V>; N], by: &[Rotatio
 pub enum AngleRange {
     /// Up to the rotation in half an integration step, 0.1 rad.
     Near,
-    /// Up to the angle between two Runge-Kutta stages at one time, 0.0125 rad.
+    /// Up to the angle between two Runge-Kutta stages at the same time, 0.0125 rad.
     Slight,
 }
 
@@ -150,7 +150,7 @@ impl AngleRange {
         }
     }
 
-    /// An angle, rad, divided by the largest of the range: above 1 the series does not hold.
+    /// An angle, rad, divided by the largest angle of the range; above 1 the series of [`Rotation`] is not accurate.
     #[inline(always)]
     pub fn part<V: Number>(self, angle: V) -> V {
         angle * V::of(lit(1.0 / self.largest()))

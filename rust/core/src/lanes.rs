@@ -1,6 +1,6 @@
 //! Several numbers side by side, which a processor's vector unit takes together.
 //!
-//! They are arrays and plain loops, which compilers turn into vector instructions wherever a function is compiled for them (see
+//! Lanes are arrays, worked on by plain loops, which compilers turn into vector instructions wherever a function is compiled for them (see
 //! [`crate::cpu`]). All functions are inlined: one that is not would be compiled for every processor.
 
 use crate::cpu::Cpu;

@@ -47,7 +47,7 @@ pub fn free_inertia<V: Number, const N: usize>(inertia: &[[V; N]; N], j: usize) 
     V::of(lit(1.0)) / solve_positive_definite(*inertia, unit)[j]
 }
 
-/// Solves two equations `a x = b` by Cramer's rule, which divides once.
+/// Solves two equations `a x = b` by Cramer's rule, with a single division.
 #[inline(always)]
 fn cramer<V: Number, const N: usize>(a: &[[V; N]; N], b: &[V; N]) -> [V; N] {
     let (i, j) = (0, N - 1);

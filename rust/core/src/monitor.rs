@@ -3,8 +3,9 @@
 //!
 //! **Spread.** Mean square of each prediction error over the last `memory` samples; with the diagonal of `P` it gives standard deviations.
 //!
-//! **Excitation.** The leverage of a sample, averaged over `memory` samples, as a share of the leverage that every sample would have if all
-//! excited alike: near 1 while every parameter keeps being excited, near 0 while the arm rests or repeats known motion.
+//! **Excitation.** The leverage of a sample ([`crate::rls::Rls::leverage`]), averaged over `memory` samples, as a share of the leverage that every
+//! sample would have if all samples excited the parameters equally: near 1 while every parameter keeps being excited, near 0 while the arm rests or
+//! repeats known motion.
 //!
 //! **Alarm.** A cumulative sum test (Page 1954) on the normalised error. While learning, the variance of each error and its correlation
 //! from one sample to the next are measured; afterwards `u = (e - rho e_last)/sigma` is tested for a standard deviation that has grown
@@ -38,7 +39,7 @@ pub struct MonitorSettings<T> {
     pub learning: u32,
     /// Mean number of samples between false alarms.
     pub between: T,
-    /// Least standard deviation of a prediction error, in the unit of the error: smaller errors are not worth an alarm.
+    /// Lower limit of the learned standard deviation of a prediction error, in the unit of the error; the alarm ignores errors of this size.
     pub floor: T,
 }
 
@@ -85,7 +86,7 @@ impl<T: Real, const N: usize> Monitor<T, N> {
     }
 
     /// Takes the prediction `error` of a used sample, its `leverage`, the number of estimated `parameters`, and the `age` of the estimate in samples,
-    /// at most its memory.
+    /// at most the memory of the forgetting factor.
     #[inline]
     pub fn update(&mut self, error: &SVector<T, N>, leverage: T, parameters: usize, age: T) {
         self.samples = self.samples.saturating_add(1);
@@ -133,7 +134,7 @@ impl<T: Real, const N: usize> Monitor<T, N> {
         for j in 0..N {
             let u = (error[j] - self.correlation[j] * self.last[j]) * self.inverse_sigma[j];
             let step = (u * u).min(lit(OUTLIER)) * gain - toll;
-            // Twice the limit is far enough: so an alarm ends soon after its cause.
+            // The sum is at most twice the alarm limit, so that an alarm ends soon after its cause has ended.
             self.sum[j] = (self.sum[j] + step).max(T::zero()).min(self.limit + self.limit);
         }
     }

@@ -1,7 +1,7 @@
 //! Number type of the equations of motion: one real number, or several side by side.
 //!
-//! An arm's equation is written once over [`Number`]; with a [`Real`] it moves one arm, with [`crate::lanes::Lanes`] several at once.
-//! There are no comparisons to branch on: lanes differ by arithmetic, or by a choice between two computed values.
+//! An arm's equation is written once over [`Number`]; with a [`Real`] it moves one arm, with [`crate::lanes::Lanes`] several at once. The equations
+//! do not branch on comparisons: cases are distinguished by arithmetic, or by a choice between two computed values in each lane.
 
 use crate::cpu::{Cpu, Portable};
 use crate::real::Real;
@@ -11,10 +11,10 @@ use core::ops::{Add, Div, Mul, Neg, Sub};
 pub trait Number:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
 {
-    /// Type of one of the numbers, `f32` or `f64`.
+    /// Type of the number in one lane, `f32` or `f64`.
     type Real: Real;
 
-    /// How many numbers lie side by side.
+    /// Number of lanes: how many real numbers are side by side.
     const WIDTH: usize;
 
     /// The number `x` in every lane.

@@ -6,9 +6,9 @@
 //! inertia d2(u q + deflection)/dt2 = tau - transmitted,      transmitted = stiffness deflection + damping d(deflection)/dt
 //! ```
 //!
-//! (Spong 1987), where `u` is the rotor Jacobian: 1 for the joint's own position and the coupling ratio for inner joints, on which the
-//! motor reacts with the same share of the torque that it does not transmit. Within a backlash of width `backlash` no torque is transmitted;
-//! outside it the flanks push and never pull. The hysteresis state of a joint changes with the distance travelled alone.
+//! (Spong 1987), where `u` is the rotor Jacobian: 1 for the joint's own position and the coupling ratio for inner joints, on which the motor reacts
+//! with this ratio times the part of its torque that is not transmitted. Within a backlash of width `backlash` no torque is transmitted; outside it
+//! the flanks push and never pull. The hysteresis state of a joint changes with the distance travelled alone.
 
 use crate::real::{Real, lit};
 use nalgebra::SVector;
@@ -62,7 +62,7 @@ impl<T: Real> Transmission<T> {
         self.backlash * lit(0.5)
     }
 
-    /// Natural frequency of rotor and link against each other, or damping rate if faster, 1/s; `link` is the link's inertia, kg m^2 (kg).
+    /// Natural frequency of rotor and link against each other, or damping rate if that is larger, 1/s; `link` is the link's inertia, kg m^2 (kg).
     pub fn rate(&self, link: T) -> T {
         let spread = T::one() / self.inertia + T::one() / link;
         (self.stiffness * spread).sqrt().max(self.damping * spread)

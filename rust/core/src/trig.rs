@@ -1,9 +1,9 @@
 //! Sine and cosine together, with the same few instructions for every angle an arm can have.
 //!
-//! Library functions take another path for small, middling and large angles and, without a platform's mathematics, cost more than all of the
-//! least squares. Here the angle is brought into half a turn around zero by Cody and Waite's subtraction of `k pi` in three parts,
-//! whose products with `k` are exact; both series are evaluated at once, in pairs of terms, and an odd `k` changes both signs. Larger
-//! angles and NaN go to the library. Errors stay below 1.5 rounding units of 1.
+//! Library functions branch for small, medium and large angles and, without a platform's mathematical library, take more time than the whole
+//! least-squares update. Here the angle is brought into half a turn around zero by Cody and Waite's subtraction of `k pi` in three parts, whose
+//! products with `k` are exact; both series are evaluated at once, in pairs of terms, and an odd `k` changes both signs. Larger angles and NaN go to
+//! the library. Errors stay below 1.5 rounding units of 1.
 //!
 //! W. J. Cody and W. Waite 1980, *Software manual for the elementary functions*, chapter 8. The coefficients interpolate the series at
 //! Chebyshev's points of `r^2` up to `(pi/2)^2`; the polynomials are off by less than 4e-17, in single precision by 1.1e-10.
@@ -17,7 +17,7 @@ use crate::real::{Real, lit};
 struct Constants {
     /// Largest angle, rad, that the series is used for; up to it `k`, the number of half turns, has few enough bits.
     largest: f64,
-    /// Number that rounds to an integer when it is added and subtracted again.
+    /// Number that, added to a value and subtracted again, rounds the value to an integer.
     rounder: f64,
     /// `pi` as a sum of three parts.
     parts: [f64; 3],
@@ -133,7 +133,8 @@ pub(crate) fn series_of<V: Number>(x: V) -> (V, V) {
     (sine * sign, cosine * sign)
 }
 
-/// Polynomial in `z` by pairs of terms, which need not wait for each other; all eight coefficients, or the first five unless `whole`.
+/// Polynomial in `z` with the coefficients `c`, by pairs of terms that are computed independently; with all eight coefficients if `whole`, else with
+/// the first five.
 #[inline(always)]
 fn series<V: Number>(z: V, c: &[f64; 8], whole: bool) -> V {
     let c = |i: usize| V::of(lit(c[i]));
@@ -159,7 +160,7 @@ pub const NEAR: f64 = 0.1;
 /// Largest angle of [`Rotation::slight`], rad, with errors below 7e-16.
 pub const SLIGHT: f64 = 0.0125;
 
-/// Coefficients of `(sin r - r)/r^3` and `(cos r - 1)/r^2` in powers of `r^2`, up to [`NEAR`] and up to [`SLIGHT`].
+/// Coefficients of `(sin r - r)/r^3` (`_SINE`) and `(cos r - 1)/r^2` (`_COSINE`) in powers of `r^2`, for angles `r` up to [`NEAR`] and [`SLIGHT`].
 const NEAR_SINE: [f64; 3] =
     [-0.166_666_666_666_580_56, 0.008_333_333_178_343_767, -0.000_198_371_366_661_129_7];
 const NEAR_COSINE: [f64; 4] =
@@ -167,7 +168,7 @@ const NEAR_COSINE: [f64; 4] =
 const SLIGHT_SINE: [f64; 2] = [-0.166_666_666_666_061_17, 0.008_333_302_331_408_075];
 const SLIGHT_COSINE: [f64; 2] = [-0.499_999_999_995_761_45, 0.041_666_449_653_307_6];
 
-/// Sine of a small angle, and its cosine less one.
+/// Rotation by a small angle: sine of the angle, and cosine of the angle minus one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rotation<V> {
     sine: V,
@@ -203,7 +204,7 @@ impl<V: Number> SinCos<V> {
         Self { sine, cosine }
     }
 
-    /// Sine and cosine of the angle plus a rotation, by the addition theorems: only the change is rounded anew.
+    /// Sine and cosine of the angle plus a rotation, by the addition theorems.
     #[inline(always)]
     pub fn by(&self, rotation: &Rotation<V>) -> Self {
         let Rotation { sine, less } = *rotation;
@@ -218,7 +219,7 @@ impl<V: Number> SinCos<V> {
 mod tests {
     use super::*;
 
-    /// Bound of the error of sine and cosine in rounding units: of the reduced angle, of its square, and of the sum.
+    /// Bound of the error of sine and cosine, in units of machine epsilon, due to rounding of the reduced angle, its square and the final sum.
     const ROUNDINGS: f64 = 1.5;
 
     #[test]

@@ -17,7 +17,7 @@ use crate::search::crosswise::{crosswise, explains};
 use armgap_core::arm::Arm;
 use std::time::Instant;
 
-/// Note of a diagnosis by interleaved cross-validation.
+/// Note in the result of a diagnosis by interleaved cross-validation.
 const CROSSWISE: &str = "effects fitted to the training logs did not explain the holdout: every log was cut into stretches that were learnt \
      from and judged on by turns";
 
@@ -98,7 +98,7 @@ impl Request<'_> {
         };
         let mut context = match self.context(arm, theta, &training, &holdout) {
             Ok(context) => context,
-            // Stretches may hold too few windows where the logs do not.
+            // Stretches of logs may hold too few windows although the whole logs hold enough.
             Err(DiagnoseError::TooShort { .. }) => return Ok(None),
             Err(error) => return Err(error),
         };

@@ -1,10 +1,10 @@
 //! armgap-fit: diagnosis of the gap between a nominal arm model and recorded logs.
 //!
-//! Folders stand in the order of the data flow; each may use the folders before it and none after it. [`numeric`] and [`model`] (used by every
-//! other folder) -> [`log`] -> [`predict`] (rollouts of short windows) -> [`likelihood`] (weighted residuals and their best fit) ->
-//! [`locate`] (where the gap lies) -> [`candidates`] (which effects are worth a fit) -> [`search`] (which effects are causes) ->
-//! [`disturbance`] (external torques) -> [`result`] (the diagnosis as data). [`diagnose`] runs these folders for arms of a closed form, [`serial`]
-//! diagnoses any chain of joints. [`identify`] estimates parameters without a diagnosis.
+//! Folders stand in the order of the data flow; each may use the folders before it and none after it. [`numeric`] and [`model`] (used by every other
+//! folder) -> [`log`] -> [`predict`] (rollouts of short windows) -> [`likelihood`] (weighted residuals and their best fit) -> [`locate`] (where the
+//! gap lies) -> [`candidates`] (which effects to fit) -> [`search`] (which effects are causes) -> [`disturbance`] (external torques) -> [`result`]
+//! (the diagnosis as data). [`diagnose`] runs these folders for arms of a closed form, [`serial`] diagnoses any chain of joints. [`identify`]
+//! estimates parameters without a diagnosis.
 
 #![forbid(unsafe_code)]
 

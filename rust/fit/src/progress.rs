@@ -53,7 +53,7 @@ impl Phase {
             Self::Finalists => 0.38,
             Self::Pushes => 0.05,
             Self::Result => 0.95,
-            // Twice as dear as all before it, and once or twice is enough.
+            // Each repetition takes twice the time of all before it, and one or two repetitions suffice.
             Self::Simulate => 0.4,
         }
     }
@@ -89,8 +89,8 @@ pub struct ProgressReporter {
     planned: AtomicUsize,
     /// Units of work done in the current phase.
     done: AtomicUsize,
-    /// Fractions of the work, 0 to 1, at which the current phase begins and ends, and the largest one reported; as bits, which sort like positive
-    /// numbers.
+    /// Fractions of the work, 0 to 1, at which the current phase begins and ends, and the largest fraction reported; as bits of doubles, whose order
+    /// as integers is that of the numbers.
     from: AtomicU64,
     to: AtomicU64,
     reported: AtomicU64,

@@ -14,7 +14,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use std::collections::BTreeMap;
 
-/// Largest departure of a joint's rotation matrix from orthogonality, and of a joint axis from unit length.
+/// Largest accepted departure of a joint's rotation matrix from orthogonality, and of a joint axis from unit length.
 const ORTHOGONAL: f64 = 1e-6;
 
 /// Serial arm of one to seven joints, under gravity.

@@ -73,7 +73,8 @@ pub fn effects(py: Python<'_>) -> PyResult<Bound<'_, PyList>> {
     Ok(list)
 }
 
-/// Inertial base parameters from masses, kg, lengths, m, distances of the centres of mass, m, and inertias, kg m^2, of the links.
+/// Inertial base parameters from masses, kg, lengths, m, distances of the centres of mass from the joints, m, and inertias about them, kg m^2, of the
+/// links.
 #[pyfunction]
 pub fn theta_from_links<'py>(
     py: Python<'py>,

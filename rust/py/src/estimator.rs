@@ -90,13 +90,13 @@ enum Any {
 #[pyclass(module = "armgap._native")]
 #[derive(Clone)]
 pub struct Estimator {
-    // In a box: up to a hundred kilobytes.
+    // In a box, as an estimator takes up to a hundred kilobytes.
     any: Box<Any>,
     joints: usize,
 }
 
-/// Settings of an online estimator; `numbers` are cut-off, forgetting factor, p0, memory, samples between false alarms and floor, `counts` samples of
-/// settling and learning.
+/// Settings of an online estimator; `numbers` are cut-off, rad/s, forgetting factor, p0, memory, samples between false alarms and floor, `counts`
+/// numbers of samples for settling and learning.
 fn settings<T: Real>(
     scheme: &str,
     paper: bool,
@@ -154,7 +154,7 @@ fn converted<T: Real>(x: &[f64]) -> Vec<T> {
     x.iter().map(|x| lit(*x)).collect()
 }
 
-/// Number of an outcome, in the order of `armgap.estimator.OUTCOMES`.
+/// Code of the outcome of a sample: its index in `armgap.estimator.OUTCOMES`.
 fn code(outcome: SampleStatus) -> u8 {
     match outcome {
         SampleStatus::Updated => 0,
@@ -278,7 +278,7 @@ impl Estimator {
         Ok(Self { any: Box::new(any), joints: chain.joints.len() })
     }
 
-    /// Takes one sample at the time `when`, s, or, with `after`, so long after the last one; returns 0 for updated, 1 starting, 2 rejected.
+    /// Takes one sample at the time `when`, s, or, with `after`, `when` seconds after the last one; returns 0 for updated, 1 starting, 2 rejected.
     #[pyo3(signature = (when, after, q, dq, tau))]
     fn update(
         &mut self,
@@ -299,8 +299,8 @@ impl Estimator {
         Ok(code(self.any.update(when, q, dq, tau)))
     }
 
-    /// Takes many samples without the interpreter's lock; returns estimates and prediction errors after each sample, NaN where it gave none, and
-    /// outcomes: 0 updated, 1 starting, 2 rejected.
+    /// Takes many samples without the interpreter's lock; returns estimates and prediction errors after each sample, errors NaN for samples without
+    /// an update, and outcomes: 0 updated, 1 starting, 2 rejected.
     fn run<'py>(
         &mut self,
         py: Python<'py>,

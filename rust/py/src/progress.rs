@@ -1,7 +1,7 @@
 //! Progress callbacks: long work runs on a thread of its own, while the calling thread reports progress to Python and checks for signals.
 //!
-//! Only the calling thread enters Python: for signals 25 times a second, to report progress 8 times. When interrupted it returns at once; the
-//! work is told to stop, and ends at its next unit while no thread waits for it, which is why it owns its data.
+//! Only the calling thread enters Python: for signals 25 times a second, to report progress 8 times. When interrupted, the calling thread returns at
+//! once; the work is cancelled, and ends at its next unit while no thread waits for it, which is why the work owns its data.
 
 use armgap_fit::progress::{Control, Observer, Progress};
 use pyo3::exceptions::PyRuntimeError;
@@ -42,7 +42,7 @@ pub fn with_progress<T: Send + 'static>(
     let observer = observer(&shared);
     let (send, ended) = sync_channel(1);
     let thread = std::thread::spawn(move || {
-        // Nobody listens any more after an interrupt.
+        // After an interrupt nothing receives the result.
         let _ = send.send(work(&observer));
     });
     let looked = Arc::clone(&shared);

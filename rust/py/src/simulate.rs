@@ -85,7 +85,7 @@ impl Inputs<'_, '_> {
             };
             guarded(|| run(work))
         })?;
-        // Stopped only when this thread has left already.
+        // The work is cancelled only after an interrupt, when `with_progress` has returned an error.
         let Some(result) = ended.flatten() else { return Ok(None) };
         let trajectory = result.map_err(|e| PyValueError::new_err(e.to_string()))?;
         let shape = |x: Vec<f64>| PyArray1::from_vec(py, x).reshape([rows, n]);

@@ -99,7 +99,7 @@ impl ArmKind {
     }
 }
 
-/// A serial arm with `N` joints and `P` parameters, linear in them.
+/// A serial arm with `N` joints and `P` parameters, in which its dynamics are linear.
 ///
 /// Required methods are the equations of one kind of arm; provided methods follow from them.
 pub trait Arm<T: Real, const N: usize, const P: usize>: Clone + Send + Sync {
@@ -127,17 +127,19 @@ pub trait Arm<T: Real, const N: usize, const P: usize>: Clone + Send + Sync {
     /// Regressor `Pm`, `(N, P)`, of the momentum: `Pm theta = M(q) dq`.
     fn momentum_regressor(&self, q: &SVector<T, N>, dq: &SVector<T, N>) -> SMatrix<T, N, P>;
 
-    /// Regressor `B`, `(N, P)`, of what the rate of the momentum leaves of the torque: `B theta = g(q) - dK/dq`, `K` the kinetic energy.
+    /// Regressor `B`, `(N, P)`, of the torque minus the time derivative of the momentum, without friction: `B theta = g(q) - dK/dq`, `K` the kinetic
+    /// energy.
     fn potential_regressor(&self, q: &SVector<T, N>, dq: &SVector<T, N>) -> SMatrix<T, N, P>;
 
-    /// [`Arm::energy_regressor`] for the online estimator; an arm overrides it to compute several sines and cosines at once on the processor
-    /// `C`.
+    /// Same as [`Arm::energy_regressor`], for the online estimator; an arm overrides this method to compute several sines and cosines at once on the
+    /// processor `C`.
     #[inline(always)]
     fn energy_regressor_on<C: Cpu>(&self, q: &SVector<T, N>, dq: &SVector<T, N>) -> SVector<T, P> {
         self.energy_regressor(q, dq)
     }
 
-    /// [`Arm::momentum_regressor`] and [`Arm::potential_regressor`], for the online estimator; an arm overrides it to share terms between them.
+    /// [`Arm::momentum_regressor`] and [`Arm::potential_regressor`], for the online estimator; an arm overrides this method to compute shared terms
+    /// once.
     #[inline(always)]
     fn momentum_and_potential<C: Cpu>(
         &self,

@@ -8,7 +8,7 @@
 //! g = [theta4 s1 + theta5 s12,  theta5 s12]          f = [theta6 dq1 + theta8 sgn dq1, theta7 dq2 + theta9 sgn dq2]
 //! ```
 //!
-//! `C` is the matrix of Christoffel's symbols, for which `dM/dt - 2 C` is skew-symmetric. The paper prints a matrix with equal product `C dq`,
+//! `C` is the matrix of Christoffel's symbols, for which `dM/dt - 2 C` is skew-symmetric. Reyes and Kelly print a matrix with equal product `C dq`,
 //! for which only `dq' (dM/dt - 2 C) dq = 0` holds.
 
 use super::{Arm, EquationTerms, Parameter};

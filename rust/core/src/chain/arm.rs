@@ -25,7 +25,7 @@ const fn first_rotor(joints: usize) -> usize {
     LINK_PARAMETERS * joints
 }
 
-/// Fails to compile unless `P` is 13 parameters for each of `N` joints.
+/// Compile-time check that `P` is 13 parameters for each of `N` joints.
 #[inline(always)]
 const fn check<const N: usize, const P: usize>() {
     const { assert!(P == PARAMETERS_PER_JOINT * N, "a chain has 13 parameters per joint") }

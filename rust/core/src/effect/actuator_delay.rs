@@ -1,7 +1,7 @@
 //! Pure delay of the torque: `tau_joint(t) = tau(t - delay)`.
 //!
-//! A delay that is no whole number of samples puts a step of the held command inside an interval; the interval then
-//! carries its exact mean and first moment. Before the log begins, the first command is taken to have been held.
+//! A delay that is no whole number of samples puts a step of the held command inside an interval; the torque over the interval then has the exact
+//! mean and first moment of the delayed command. Before the log begins, the first command is taken to have been held.
 
 use super::{Effect, EffectParameter, Hooks, InputSegment, MAX_PARAMETERS, Quantity, Spec};
 use crate::real::{Real, lit};

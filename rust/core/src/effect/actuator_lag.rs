@@ -1,7 +1,7 @@
 //! First-order lag of the torque: `time_constant dtau_joint/dt + tau_joint = tau`.
 //!
-//! With the command held over an interval of length `h`, the torque goes exponentially from its old value to the
-//! command. Its mean over the interval and its first moment are exact for every time constant down to zero.
+//! With the command held over an interval of length `h`, the torque goes exponentially from its old value to the command. The torque's mean over the
+//! interval and its first moment are exact for every time constant down to zero.
 
 use super::{Effect, EffectParameter, Hooks, InputSegment, MAX_PARAMETERS, Quantity, Spec};
 use crate::real::{Real, lit};

@@ -12,7 +12,7 @@ use crate::transmission::Transmission;
 /// Natural frequency of the rotor of a backlash on its flanks where the motion of the link is measured, not simulated, 1/s.
 const FLANK_RATE: f64 = 800.0;
 
-/// Damping ratio of the rotor of a backlash on its flanks, where the motion of the link is measured: no rebound.
+/// Damping ratio of the rotor of a backlash on its flanks, where the motion of the link is measured; large enough that the rotor does not rebound.
 const FLANK_DAMPING: f64 = 0.8;
 
 /// Backlash between a motor and its link.

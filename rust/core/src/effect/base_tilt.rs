@@ -1,4 +1,4 @@
-//! The base stands at an angle: gravity is turned by `angle` in the plane of motion, for all joints alike.
+//! Tilted base: gravity is turned by `angle` in the plane of motion, for all joints alike.
 
 use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Quantity, Scope, Spec};
 use crate::real::Real;

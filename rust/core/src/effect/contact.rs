@@ -18,7 +18,7 @@ static SPEC: Spec = Spec {
         EffectParameter::bounded("stiffness", Quantity::ContactStiffness, 0.0, f64::INFINITY),
         EffectParameter::bounded("damping", Quantity::ContactDamping, 0.0, f64::INFINITY),
     ],
-    // Shares of the reach on either side.
+    // Positions as shares of the farthest position reached on either side of zero.
     initial_guesses: &[
         [0.99, 150.0, 0.5],
         [-0.99, 150.0, 0.5],

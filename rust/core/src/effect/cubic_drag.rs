@@ -3,7 +3,7 @@
 use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Spec};
 use crate::real::Real;
 
-/// Drag cubic in speed.
+/// Drag cubic in speed: the torque `-c3 dq^3`.
 #[derive(Debug)]
 pub struct CubicDrag;
 

@@ -1,9 +1,9 @@
-//! An encoder disc off its centre: it shows `q + a sin q + b cos q`.
+//! Encoder disc mounted off its centre: the encoder shows `q + a sin q + b cos q`.
 
 use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Quantity, Spec, Trial};
 use crate::real::Real;
 
-/// Eccentricity of an encoder disc: it shows `q + a sin q + b cos q`.
+/// Eccentricity of an encoder disc: the encoder shows `q + a sin q + b cos q`.
 #[derive(Debug)]
 pub struct EncoderEccentricity;
 

@@ -1,9 +1,9 @@
-//! The encoder's zero is off: it shows `q + offset`.
+//! Offset of the encoder's zero: where the joint is at `q`, the encoder shows `q + offset`.
 
 use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Quantity, Spec};
 use crate::real::Real;
 
-/// Offset of the encoder's zero: it shows `q + offset`.
+/// Offset of the encoder's zero, rad or m: the encoder shows `q + offset`.
 #[derive(Debug)]
 pub struct EncoderOffset;
 

@@ -1,7 +1,6 @@
 //! External disturbance of one log: a constant torque of the given impulse, N m s (N s), for `duration`, s, around `time`, s.
 //!
-//! Each interval carries the exact mean and first moment of the torque over it, so a mass gains the exact speed and distance whatever
-//! the sample times.
+//! The torque over each sample interval has the exact mean and first moment, so a mass gains the exact speed and distance whatever the sample times.
 
 use super::{Effect, EffectParameter, Hooks, InputSegment, MAX_PARAMETERS, Quantity, Spec, Trial};
 use crate::real::{Real, lit};

@@ -4,7 +4,7 @@
 //! rotor_inertia d2(q + deflection)/dt2 = tau - stiffness deflection - damping d(deflection)/dt
 //! ```
 //!
-//! Damping has no effect beyond the critical damping of the rotor on its shaft, `2 sqrt(stiffness rotor_inertia)`.
+//! Damping above the critical damping of the rotor on its shaft, `2 sqrt(stiffness rotor_inertia)`, is replaced by the critical damping.
 //!
 //! The rotor comes in addition to the rigid arm; encoder and friction are on the link's side or on the motor's
 //! ([`crate::transmission::Sides`]). A shaft of infinite stiffness is a rigid joint whose rotor is part of the arm's own inertia.
@@ -28,7 +28,7 @@ static SPEC: Spec = Spec {
         EffectParameter::bounded("damping", Quantity::ShaftDamping, 0.0, f64::INFINITY),
         EffectParameter::bounded("rotor_inertia", Quantity::Inertia, 1e-6, f64::INFINITY),
     ],
-    // Motors of 3, 8 and 30 % of the link's inertia that oscillate at 8 to 40 Hz against it.
+    // Rotors of 3, 8 and 30 % of the link's inertia that oscillate at 8 to 40 Hz against the link.
     initial_guesses: &[
         [0.15, 0.3, 0.03],
         [0.5, 0.5, 0.03],
@@ -59,7 +59,7 @@ impl<T: Real> Effect<T> for JointElasticity {
         (!rigid).then_some(Transmission {
             inertia: p[2],
             stiffness: p[0],
-            // Beyond critical damping there is no resonance left, and nothing that a shaft does.
+            // Beyond critical damping no resonance is left by which a shaft could be recognised.
             damping: p[1].min((p[0] * p[2]).max(T::zero()).sqrt() * lit(2.0)),
             backlash: T::zero(),
             part_of_link: false,

@@ -139,7 +139,7 @@ pub struct Spec {
     pub equation: &'static str,
     /// Literature or practice that the effect's equation comes from.
     pub source: &'static str,
-    /// Motion that a log must contain for the effect to show.
+    /// Motion that a log must contain for the effect to be detectable.
     pub excited_by: &'static str,
     /// Whether the effect belongs to one joint or to the arm.
     pub scope: Scope,
@@ -175,8 +175,8 @@ impl Spec {
 /// First-order test of an effect on the residual, before the effect is fitted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Trial {
-    /// Test by the derivatives of the predictions by the first parameters, which are amplitudes: at their neutral values together the effect
-    /// vanishes. The value is their number.
+    /// Test by the derivatives of the predictions by the first parameters, which are amplitudes: the effect vanishes where all amplitudes have their
+    /// neutral values. The value is the number of amplitudes.
     Amplitudes(usize),
     /// Test by the derivative of the predictions at the neutral value along a ray on which all parameters grow together.
     Ray,
@@ -208,7 +208,7 @@ pub struct JointPoint<T> {
     pub memory: T,
 }
 
-/// Position at which a joint's torque jumps, and spring and damper of the contact beyond it, on the side away from zero.
+/// Joint limit: position at which a joint's torque jumps, and stiffness and damping of the contact beyond this position, away from zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Edge<T> {
     /// Joint position at which the torque jumps, rad or m.
@@ -226,7 +226,7 @@ impl<T: Real> Edge<T> {
         (q - self.position) * self.position > T::zero()
     }
 
-    /// Fastest rate of the contact with a body of `inertia`, kg m^2 (kg), in 1/s.
+    /// Rate of the contact with a body of `inertia`, kg m^2 (kg), in 1/s: natural frequency, or damping rate if that is larger.
     pub fn rate(&self, inertia: T) -> T {
         (self.stiffness / inertia).sqrt().max(self.damping / inertia)
     }
@@ -237,7 +237,8 @@ pub trait Effect<T: Real>: Sync {
     /// Name, parameters, hooks and further description of the effect.
     fn spec(&self) -> &'static Spec;
 
-    /// Name of the effect that is left when the first parameter vanishes; its parameters are the others, under the same names.
+    /// Name of the effect that is left when the first parameter is zero, if there is one; that effect has the further parameters, under the same
+    /// names.
     fn simpler(&self) -> Option<&'static str> {
         None
     }
@@ -287,7 +288,7 @@ pub trait Effect<T: Real>: Sync {
         None
     }
 
-    /// Angle by which the base is turned against gravity, rad.
+    /// Angle by which the base is turned in the plane of motion, rad.
     fn tilt(&self, _p: &[T; MAX_PARAMETERS]) -> T {
         T::zero()
     }

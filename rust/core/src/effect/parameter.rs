@@ -3,7 +3,7 @@
 /// Value of a threshold that is never reached, in its SI unit: the neutral value of effects that begin beyond a threshold.
 pub const NEVER: f64 = 1e9;
 
-/// Quantity that a parameter of an effect measures; it decides the unit and the scale of a first trial value.
+/// Quantity that a parameter of an effect measures; it decides the parameter's unit and the scale of its initial guesses (trial values).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quantity {
     /// Joint torque (force on a linear joint).

@@ -1,4 +1,4 @@
-//! Presliding friction: before it slides, a contact gives like a spring, and after a reversal friction builds up again over a distance
+//! Presliding friction: before it slides, a friction contact deflects elastically, and after a reversal friction builds up again over a distance
 //! (Dahl 1968),
 //!
 //! ```text
@@ -10,7 +10,7 @@
 use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Spec, Trial};
 use crate::real::Real;
 
-/// Presliding hysteresis of Dahl (1968), besides Coulomb friction.
+/// Presliding hysteresis of Dahl (1968), in addition to Coulomb friction.
 #[derive(Debug)]
 pub struct Presliding;
 
@@ -24,7 +24,7 @@ static SPEC: Spec = Spec {
         EffectParameter::bounded("amplitude", Quantity::Torque, 0.0, f64::INFINITY),
         EffectParameter::bounded("stiffness", Quantity::Stiffness, 0.0, f64::INFINITY),
     ],
-    // Travelled distances of 0.3 to 10 % of the joint's RMS travel.
+    // Friction builds up over distances, amplitude by stiffness, of 0.3 to 10 % of the joint's RMS travel.
     initial_guesses: &[[0.1, 30.0, 0.0], [0.1, 10.0, 0.0], [0.1, 3.0, 0.0], [0.1, 1.0, 0.0]],
     trial: Trial::Ray,
     hooks: Hooks { force: true, memory: true, ..Hooks::NONE },

@@ -3,7 +3,7 @@
 use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Spec};
 use crate::real::Real;
 
-/// Drag quadratic in speed.
+/// Drag quadratic in speed: the torque `-c dq |dq|`.
 #[derive(Debug)]
 pub struct QuadraticDrag;
 

@@ -1,6 +1,6 @@
 //! Coupling of a remote motor's rotor: a motor on link 1 that drives joint 2 through a gear adds `gear inertia` to `M_12`.
 //!
-//! The rotor's share of `M_22` is the effect `rotor_inertia` on joint 2; both effects together are the whole rotor.
+//! The rotor's share of `M_22` is the effect `rotor_inertia` on joint 2; both effects together model the whole rotor.
 
 use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Quantity, Scope, Spec};
 use crate::real::Real;
@@ -18,7 +18,7 @@ static SPEC: Spec = Spec {
     scope: Scope::Arm,
     least_joints: 2,
     parameters: &[EffectParameter::signed("inertia", Quantity::Inertia)],
-    // Never searched for: the same motion as the opposite rotor_inertia of joint 2 with theta3 moved by as much.
+    // Never searched for: a `rotor_inertia` of joint 2 of opposite sign, with theta3 changed by the same amount, gives the same motion.
     initial_guesses: &[],
     hooks: Hooks::NONE,
     ..Spec::OF_JOINT

@@ -1,4 +1,4 @@
-//! Dead zone of a drive: commands below a level give no torque, larger ones their excess, `sgn(tau) max(|tau| - level, 0)`.
+//! Dead zone of a drive: commands below a level give no torque, larger commands give their excess over the level, `sgn(tau) max(|tau| - level, 0)`.
 
 use super::{Effect, EffectParameter, Hooks, InputSegment, MAX_PARAMETERS, Quantity, Spec};
 use crate::real::Real;

@@ -19,7 +19,7 @@ static SPEC: Spec = Spec {
         EffectParameter::shape("n", Quantity::Cycles, 0.2, f64::INFINITY),
         EffectParameter::shape("phase", Quantity::Angle, f64::NEG_INFINITY, f64::INFINITY),
     ],
-    // Cycles over the travel; faster ones are found in the residual.
+    // Numbers of cycles over the joint's travel; larger numbers are guessed from the residual.
     initial_guesses: &[
         [0.05, 0.5, 0.0],
         [0.05, 0.5, 1.571],

@@ -35,7 +35,7 @@ impl ChainSize {
     /// All sizes, from the smallest.
     pub const ALL: [Self; 3] = [Self::Small, Self::Medium, Self::Large];
 
-    /// Largest numbers of joints and of estimated parameters.
+    /// Largest numbers of joints and of estimated parameters that an estimator of this size has room for.
     pub const fn room(self) -> [usize; 2] {
         match self {
             Self::Small => [2, 20],
@@ -66,7 +66,7 @@ pub struct ChainSettings<'a, T> {
     pub known: &'a [T],
 }
 
-/// Largest departure of a joint's rotation matrix from orthogonality, and of a joint axis from unit length.
+/// Largest accepted departure of a joint's rotation matrix from orthogonality, and of a joint axis from unit length.
 const ORTHOGONAL: f64 = 1e-4;
 
 impl<T: Real> ChainSettings<'_, T> {

@@ -29,9 +29,9 @@ pub struct OnlineSettings<T> {
     pub scheme: Scheme,
     /// Filters and alignment of signals: as in Reyes and Kelly (1997), or consistent.
     pub variant: Variant,
-    /// Form in which the covariance is kept; by default as suits the precision and `p0`.
+    /// Form in which the covariance is kept; `None` for the default by precision and `p0` ([`Form::default_for`]).
     pub form: Option<Form>,
-    /// Whether one constant torque per joint is estimated besides the arm's parameters.
+    /// Whether one constant torque per joint is estimated in addition to the arm's parameters.
     pub asymmetry: bool,
     /// Cut-off of the filters, rad/s.
     pub cutoff: T,
@@ -50,7 +50,7 @@ pub struct EstimatorSettings<T> {
     pub scheme: Scheme,
     /// Filters and alignment of signals: as in Reyes and Kelly (1997), or consistent.
     pub variant: Variant,
-    /// Form in which the covariance is kept; by default as suits the precision and `p0`.
+    /// Form in which the covariance is kept; `None` for the default by precision and `p0` ([`Form::default_for`]).
     pub form: Option<Form>,
     /// Cut-off of the filters, rad/s.
     pub cutoff: T,
@@ -62,7 +62,7 @@ pub struct EstimatorSettings<T> {
     pub monitor: MonitorSettings<T>,
 }
 
-/// Why an online estimator cannot be made or a sample cannot be read.
+/// Error that prevents an online estimator from being made or a sample from being read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum OnlineError {
     /// The named setting is not finite or outside its range.
@@ -141,7 +141,7 @@ impl<T: Real> OnlineSettings<T> {
         Self::of(kind, false, EstimatorSettings::default())
     }
 
-    /// The settings `common` for an arm of this kind; `asymmetry` estimates one constant torque per joint besides its parameters.
+    /// The settings `common` for an arm of this kind; `asymmetry` estimates one constant torque per joint in addition to the arm's parameters.
     pub fn of(kind: ArmKind, asymmetry: bool, common: EstimatorSettings<T>) -> Self {
         let EstimatorSettings { scheme, variant, form, cutoff, forgetting, p0, monitor } = common;
         Self { kind, scheme, variant, form, asymmetry, cutoff, forgetting, p0, monitor }
@@ -235,7 +235,7 @@ impl<T: Real> Online<T> {
         &self.settings
     }
 
-    /// Estimator of whichever arm, for reading.
+    /// Estimator of the arm that was chosen at run time, behind the common trait, for reading.
     #[inline]
     pub fn estimator(&self) -> &dyn OnlineEstimator<T> {
         match &self.running {
@@ -248,7 +248,7 @@ impl<T: Real> Online<T> {
         }
     }
 
-    /// Estimator of whichever arm, for taking samples.
+    /// Estimator of the arm that was chosen at run time, behind the common trait, for taking samples.
     #[inline]
     pub fn estimator_mut(&mut self) -> &mut dyn OnlineEstimator<T> {
         match &mut self.running {
@@ -284,7 +284,7 @@ impl<T: Real> Online<T> {
         self.estimator().errors()
     }
 
-    /// Writes the diagonal of the covariance `P`, for an error of unit variance, into `out`, and returns how many entries it has.
+    /// Writes the diagonal of the covariance `P`, for an error of unit variance, into `out`, and returns the number of estimated parameters.
     pub fn variances(&self, out: &mut [T; MOST_PARAMETERS]) -> usize {
         self.estimator().variances(out)
     }

@@ -1,4 +1,4 @@
-//! Online estimator of any arm with its monitor, and the trait of all of them.
+//! Online estimator of any arm with its monitor, and the trait of all such estimators.
 
 use super::{EstimatorSettings, OnlineError, SampleStatus, When};
 use crate::arm::Arm;
@@ -30,7 +30,8 @@ pub trait OnlineEstimator<T: Real> {
     /// Prediction errors of the last sample used, N m, J or W by scheme: one per joint for the filtered dynamic model, else one.
     fn errors(&self) -> &[T];
 
-    /// Writes the diagonal of the covariance `P`, for an error of unit variance, into `out`, zeros beyond it, and returns how many entries it has.
+    /// Writes the diagonal of the covariance `P`, for an error of unit variance, into `out`, fills the rest of `out` with zeros, and returns the
+    /// number of estimated parameters.
     fn variances(&self, out: &mut [T]) -> usize;
 
     /// Mean square of each prediction error over the monitor's memory, N m, J or W squared by scheme.
@@ -68,7 +69,7 @@ where
     estimator: Estimator<T, A, N, P, R, S>,
     monitor: Monitor<T, N>,
     errors: SVector<T, N>,
-    /// Number of samples after which past samples no longer count, by forgetting.
+    /// Memory of the forgetting factor, `1 / (1 - forgetting)` samples; 1e30 without forgetting.
     memory: T,
     /// Numbers of joints in use, of estimated `parameters`, and of prediction errors per sample (`outputs`).
     joints: usize,
@@ -79,7 +80,7 @@ where
 impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize>
     MonitoredEstimator<T, A, N, P, R, AllColumns>
 {
-    /// Estimator of all parameters, from the initial estimate `theta0`, with zeros where it ends.
+    /// Estimator of all parameters, from the initial estimate `theta0`, padded with zeros.
     pub(super) fn new(arm: A, settings: &EstimatorSettings<T>, theta0: &[T]) -> Self {
         Self::of_columns(arm, AllColumns, [N, R], settings, theta0)
     }
@@ -88,7 +89,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize>
 impl<T: Real, A: Arm<T, N, P>, S: Columns<T, N, P, R>, const N: usize, const P: usize, const R: usize>
     MonitoredEstimator<T, A, N, P, R, S>
 {
-    /// Estimator of `columns` of an arm of which the first `joints` move; further joints stand still.
+    /// Estimator of the parameters `columns`, in number `parameters`, of an arm of which the first `joints` move; further joints stand still.
     pub(super) fn of_columns(
         arm: A,
         columns: S,
@@ -120,7 +121,7 @@ impl<T: Real, A: Arm<T, N, P>, S: Columns<T, N, P, R>, const N: usize, const P: 
         }
     }
 
-    /// Changes the instruction set; the default is the widest that the processor has.
+    /// Changes the instruction set that samples are processed with; the default is [`Level::detect`].
     pub fn with_level(mut self, level: Level) -> Self {
         self.estimator = self.estimator.with_level(level);
         self

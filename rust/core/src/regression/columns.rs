@@ -72,7 +72,7 @@ impl<T: Real, const N: usize, const P: usize, const R: usize> Columns<T, N, P, R
     }
 }
 
-/// Marks, in place of an index of a column, a friction torque that is not estimated.
+/// Value, in place of the index of a column, that marks a friction torque that is not estimated.
 const NONE: u8 = u8::MAX;
 
 /// Estimated parameters chosen at run time, and known values of further parameters.

@@ -91,7 +91,7 @@ impl<T: Real, const R: usize> Factorized<T, R> {
         let (r, mut moved) = (count.of(R), [T::zero(); R]);
         let mut leverage = T::zero();
         for m in 0..M {
-            // What the rows before have already explained.
+            // Prediction error after the change of the estimate, `moved`, by the rows before.
             let left = if m == 0 { error[m] } else { error[m] - dot::<C, T, R>(&moved, &rows[m], r) };
             leverage += self.row::<C, N>(&mut moved, &rows[m], left, r, forgetting.mu);
         }

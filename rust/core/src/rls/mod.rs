@@ -41,7 +41,7 @@ impl Form {
     }
 }
 
-/// Recursive least squares: estimate and covariance of `R` parameters, or of the first of them where `N` is chosen at run time.
+/// Recursive least squares: estimate and covariance of up to `R` parameters; `N` says how many of them, counted from the first, are in use.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rls<T: Real, const R: usize, N: Count = All> {
     theta: SVector<T, R>,
@@ -112,7 +112,7 @@ impl<T: Real, const R: usize, N: Count> Rls<T, R, N> {
         self
     }
 
-    /// Changes the instruction set; the default is the widest that the processor has.
+    /// Changes the instruction set that samples are processed with; the default is [`Level::detect`].
     pub fn with_level(mut self, level: Level) -> Self {
         self.level = level;
         self
@@ -240,7 +240,7 @@ impl<T: Real, const R: usize> Covariance<T, R> {
 }
 
 impl<T: Real, const R: usize> Forgetting<T, R> {
-    /// Factors by which forgetting multiplies rows and columns of a covariance with this diagonal, and whether they differ.
+    /// Factors by which forgetting multiplies rows and columns of a covariance with this diagonal, and whether any factor is limited.
     #[inline]
     fn lift(&self, diagonal: &[T; R]) -> ([T; R], bool) {
         let full = T::one() / self.mu.sqrt();
@@ -262,7 +262,7 @@ fn is_double<T: Real>() -> bool {
     T::default_epsilon() < lit(1e-12)
 }
 
-/// Largest entry of a regressor or a prediction error that is taken: products of three such numbers with `P` stay finite.
+/// Largest entry of a regressor or a prediction error that is accepted: products of three such numbers with `P` stay finite.
 #[inline]
 fn largest<T: Real>() -> T {
     if is_double::<T>() { lit(1e30) } else { lit(1e9) }

@@ -53,7 +53,7 @@ impl<T: Real, const R: usize> Plain<T, R> {
                 total[l][m] = dot::<C, T, R>(&gain[l], &rows[m], r);
             }
             total[l][l] += forgetting.mu;
-            // Beyond this what is left of `P` in the direction of the row would be rounding.
+            // Beyond this limit the updated `P` in the direction of the row would consist of rounding errors.
             sound &= total[l][l] * T::default_epsilon() <= forgetting.mu * lit(0.125);
         }
         let mut leverage = T::zero();
@@ -95,7 +95,7 @@ impl<T: Real, const R: usize> Plain<T, R> {
     fn times<C: Cpu, const M: usize>(&self, rows: &[[T; R]; M], r: usize) -> [[T; R]; M] {
         let mut product = [[T::zero(); R]; M];
         for c in 0..r / LANES {
-            // Two strands, so that additions need not wait for each other.
+            // Two independent sums, so that additions need not wait for each other.
             let (mut even, mut odd) = ([[T::zero(); LANES]; M], [[T::zero(); LANES]; M]);
             for k in 0..r / 2 {
                 self.add_column::<C, M>(&mut even, c, 2 * k, rows);

@@ -1,5 +1,5 @@
-//! Constants that decide in the diagnosis of a serial arm, each with its unit and reason. A term is an addition to the nominal model: an effect on a
-//! joint, a payload, a tilt of the base, or a changed link, transmission or controller setting.
+//! Thresholds and settings of the diagnosis of a serial arm, each with its unit and reason. A term is an addition to the nominal model: an effect on
+//! a joint, a payload, a tilt of the base, or a changed link, transmission or controller setting.
 
 /// Squared test statistic (estimated size over its standard deviation, robust to correlated residuals) above which a term of the model is
 /// significant, summed over training logs and holdout: five standard deviations on the training logs, which one of 300 candidates exceeds by chance
@@ -25,8 +25,8 @@ pub const MATTERS: f64 = 0.1;
 pub const CONSEQUENCE: f64 = 0.005;
 
 /// Decrease of the parameters' squared distance from the arm file's values, counted in standard deviations, above which a term that only brings the
-/// parameters back to these values is accepted, besides [`RESTORES_EACH`] for every parameter of the term. Where the arm file's values are as
-/// uncertain as their standard deviations say, a payload of four parameters exceeds `RESTORES + 4 RESTORES_EACH` by chance once in 2,000 logs.
+/// parameters back to these values is accepted, plus [`RESTORES_EACH`] for every parameter of the term. Where the arm file's values are as uncertain
+/// as their standard deviations say, a payload of four parameters exceeds `RESTORES + 4 RESTORES_EACH` by chance once in 2,000 logs.
 pub const RESTORES: f64 = 14.0;
 
 /// Further decrease of the parameters' squared distance from the arm file's values, per parameter of a term that only brings the parameters back to
@@ -34,7 +34,7 @@ pub const RESTORES: f64 = 14.0;
 pub const RESTORES_EACH: f64 = 1.5;
 
 /// Prior standard deviation of the inertial parameters of a link whose nominal values are tested as wrong, as a multiple of the arm file's standard
-/// deviation: loose, and yet enough to hold the parameters that motion does not determine near the arm file's values.
+/// deviation: wide, and yet narrow enough to hold the parameters that motion does not determine near the arm file's values.
 pub const LOOSE: f64 = 10.0;
 
 /// Excess of a model's cost after one of its terms has been replaced by another term, as a share of the cost that the replaced term explains, below
@@ -48,7 +48,7 @@ pub const ALIKE_COST: f64 = 4.0;
 /// Number of candidate terms, the best by first-order tests, that are fitted in each step of the model search.
 pub const FINALISTS: usize = 8;
 
-/// Largest number of Gauss-Newton iterations in which the parameters of a model's terms are fitted; with twelve the diagnoses are the same.
+/// Largest number of Gauss-Newton iterations in which the parameters of a model's terms are fitted; twelve iterations give the same diagnoses.
 pub const ITERATIONS: usize = 6;
 
 /// Relative decrease of the cost in one iteration below which the fit of a model's terms ends, see [`ITERATIONS`].

@@ -152,7 +152,7 @@ impl Request<'_> {
             |values: &[f64]| training.equation.conditioning(&std::array::from_fn(|i| values[i])) > least;
         let mut candidates = candidates(&arm, &theta, &training.data.tracks, self.options.known_units);
         if let Some(controller) = &controller {
-            // The noise of the positions limits what is known of a controller's torque, and with it of a deflection.
+            // Position noise limits the accuracy of a controller's torque, and so of a deflection computed from this torque.
             candidates.retain(|group| !matches!(group[0].kind, TermKind::Transmission(_)));
             let inertia = training.equation.mean_inertia(&theta);
             let period = training.data.tracks.first().map_or(0.0, Track::period);
@@ -232,15 +232,15 @@ fn controller_settings(controller: &PositionController, inertia: &[f64], period:
     all.map(|(setting, joint)| group(setting, joint)).collect()
 }
 
-/// Largest number of half cycles over the travel of a joint with which a torque ripple is tried.
+/// Largest number of half cycles over the travel of a joint among the initial guesses of a torque ripple.
 const HALF_CYCLES: usize = 80;
 
 /// Initial guesses of the transmitted torque around zero within which a link crosses its backlash, relative to the joint's RMS torque.
 const CROSSINGS: [f64; 2] = [0.03, 0.15];
 
 /// Every candidate term of an arm without controllers, at each of its initial guesses, grouped by effect and joint. Left out are effects of the
-/// library that simulate a motor beside its link (the weak form has terms of its own for transmissions), external disturbances, and effects on the
-/// whole arm, which are stated for arms in a plane.
+/// library that simulate a motor as a body separate from its link (the weak form has terms of its own for transmissions), external disturbances, and
+/// effects on the whole arm, which are stated for arms in a plane.
 fn candidates<const N: usize, const P: usize>(
     arm: &Chain<f64, N>,
     theta: &[f64; P],

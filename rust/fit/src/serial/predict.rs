@@ -1,4 +1,4 @@
-//! Predictions of a serial arm with missing terms added, over short windows and over whole logs.
+//! Predictions of a serial arm's model with terms added, over short windows and over whole logs.
 
 use crate::model::hypothesis::Hypothesis;
 use crate::predict::window::{Dataset, Window};

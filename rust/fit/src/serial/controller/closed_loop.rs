@@ -25,11 +25,11 @@ const RESOLVED: f64 = 0.2;
 /// Largest number of controller periods in one sample interval.
 const MOST_PERIODS: usize = 100;
 
-/// Part of a controller period by which a sample interval may be longer than a whole number of periods before it is divided into one period more:
-/// sample times are rounded.
+/// Part of a controller period by which a sample interval may be longer than a whole number of periods before it is divided into one period more, as
+/// sample times carry rounding errors.
 const ROUNDING: f64 = 1e-6;
 
-/// Number of time constants after which a lag has forgotten its input.
+/// Time after which a commanded torque no longer influences a drive's torque, as a multiple of the sum of the drive's delays and time constants.
 const FORGOTTEN: f64 = 8.0;
 
 /// Position controllers in closed loop with a simulated arm.
@@ -51,7 +51,7 @@ struct Servo {
     measured: Vec<InputSegment<f64>>,
     /// Effects of the drive on the commanded torque (delay, lag, saturation), the controller's own delay first.
     laws: Vec<EffectInstance>,
-    /// Time for which the effects of the drive remember commanded torques, s.
+    /// Time for which a commanded torque influences the torque after the effects of the drive, s.
     memory: f64,
 }
 
@@ -99,7 +99,7 @@ impl Servo {
         }
     }
 
-    /// Commanded torques before sample `first` that the effects of the drive still remember.
+    /// Commanded torques before sample `first` that still influence the torque after the effects of the drive.
     fn past(&self, t: &[f64], first: usize) -> Past {
         let begin = t[..first].partition_point(|at| *at < t[first] - self.memory).saturating_sub(1);
         let begin = if self.memory > 0.0 { begin } else { first };
@@ -218,8 +218,8 @@ fn shown<const N: usize, const P: usize>(
     if hypothesis.distorts() { (hypothesis.measured(j, q), dq * hypothesis.stretch(j, q)) } else { (q, dq) }
 }
 
-/// Number of controller periods in a sample interval of length `h`, s: a period is short beside the time constants of the closed loop and of viscous
-/// friction.
+/// Number of controller periods in a sample interval of length `h`, s: a period is short compared with the time constants of the closed loop and of
+/// viscous friction.
 fn periods<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     plant: &Plant<f64, A, N, P>,
     servos: &[Servo],

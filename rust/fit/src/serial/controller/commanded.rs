@@ -1,9 +1,9 @@
 //! Weak form of the equation of motion for an arm behind position controllers: their torque along the measured path, the change of this torque by
 //! changed controller settings, and estimated gains as further parameters of the regression.
 //!
-//! With `tau = kp e + kd de + ki int e dt` and gains that are `d` more than the arm file has, `tau(nominal) = psi theta - d e`: the regressor has one
-//! more column for each estimated gain. The integral of the error up to the start of the log is unknown and makes a constant torque, which no log
-//! tells from an offset. So rows of a joint with an integral part are taken less their mean over each log.
+//! With `tau = kp e + kd de + ki int e dt` and gains that exceed the arm file's by `d`, `tau(nominal) = psi theta - d e`: the regressor has one more
+//! column for each estimated gain. The integral of the error up to the start of the log is unknown and makes a constant torque, which no log
+//! distinguishes from a torque offset. So rows of a joint with an integral part are taken less their mean over each log.
 
 use crate::log::track::Track;
 use crate::serial::controller::{Given, JointController, PositionController};
@@ -84,7 +84,8 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         self.rows.parameters += columns.len();
     }
 
-    /// Raises the noise floor of joint `j`'s rows to what the position noise adds through the controller's `kp` and `kd`.
+    /// Raises the noise floor of joint `j`'s rows, N m or N, to the standard deviation that position noise causes through inertia, `kp` and `kd`
+    /// together.
     fn floor_behind(&mut self, j: usize, controller: &JointController) {
         let [kp, kd, _] = controller.gains;
         for (row, i) in self.kept[j].iter().enumerate() {
@@ -95,7 +96,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
             };
             let momentum = square([1.0, 0.0, 0.0]);
             let floor = &mut self.rows.joints[j].floor[row];
-            // The joint's own inertia makes most of the floor so far; its sign beside the controller's gains matters little.
+            // Inertia that explains the floor so far, mostly the joint's own; its sign relative to the controller's gains matters little.
             let inertia = *floor / (log.noise[j] * momentum.sqrt()).max(f64::MIN_POSITIVE);
             *floor = floor.max(log.noise[j] * square([inertia, kp, kd]).sqrt());
         }
@@ -208,8 +209,8 @@ mod tests {
     const VISCOUS: f64 = 0.9;
     /// Constant torque that the joint needs on top of those of inertia and friction, N m.
     const OFFSET: f64 = 1.3;
-    /// Largest error, N m, of torques of some 8 N m that are computed from a log by test functions, local cubics and references that are straight
-    /// between rows.
+    /// Largest error, N m, of torques of some 8 N m that are computed from a log by test functions, local cubics and references that are held from
+    /// row to row.
     const MET: f64 = 0.02;
 
     /// One joint about the vertical, with a known moment of inertia and viscous friction.
@@ -238,7 +239,7 @@ mod tests {
         };
         let q: Vec<f64> = t.iter().map(|t| path(*t)[0]).collect();
         let wanted = |t: f64| {
-            // In the middle of the row over which it is held.
+            // Motion in the middle of the sample interval over which the reference is held.
             let [q, dq, ddq] = path(t + 0.5 * PERIOD);
             let torque = INERTIA * ddq + VISCOUS * dq + offset;
             q + (torque + kd * stated.gains[1] * dq) / (kp * stated.gains[0])

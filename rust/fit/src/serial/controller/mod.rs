@@ -88,7 +88,7 @@ impl Given {
             let h = interval(&track.t, k);
             let (a, b) = (&smoothed[k][j].local, &smoothed[next][j].local);
             let middle = 0.5 * (a.q + b.q) + 0.125 * h * (a.dq - b.dq);
-            // The mean velocity is that of viscous friction in the weak form, so that no term can be the difference of the two.
+            // The mean velocity is the one that viscous friction has in the weak form, so that no term can fit a difference of two velocities.
             let mean = 0.5 * (a.dq + b.dq);
             (
                 InputSegment { start: a.q, middle, end: b.q },
@@ -299,7 +299,7 @@ pub(in crate::serial) mod tests {
     fn reference_and_torque_may_be_late_by_parts_of_a_sample() {
         let reference = JointController { reference_delay: 0.0105, ..SERVO };
         assert!(worst(&reference, 0.0105, 0.0) < CUBIC, "{}", worst(&reference, 0.0105, 0.0));
-        // Between the means of two intervals the torque is not straight where the reference jumps.
+        // Between the middles of two intervals the torque is not linear in time where the reference jumps.
         let torque = JointController { delay: 0.0105, ..SERVO };
         assert!(worst(&torque, 0.0, 0.0105) < 0.02, "{}", worst(&torque, 0.0, 0.0105));
     }

@@ -1,4 +1,4 @@
-//! Causes as results state them, and the status of every effect that was looked for and is not named.
+//! Causes in the form of the diagnosis result, and the status of every effect that was looked for and is not named.
 
 use crate::result::report::{
     Bound, Cause, CauseValue, EquivalentSummary, Named, RuledOut, SeveralJoints, Status, Value, Values,

@@ -18,11 +18,12 @@ pub(in crate::serial) fn with_settings(
     joints
 }
 
-/// Names of joint elasticity and backlash in results and in sentences: neither effect is tested in logs without torques, and both change the damping
-/// of a control loop as a wrong derivative gain does.
+/// Joint elasticity and backlash, by name in results and in words for sentences: neither effect is tested in logs without torques, and both change
+/// the damping of a control loop as a wrong derivative gain does.
 const NOT_TESTED: [(&str, &str); 2] = [("joint_elasticity", "a shaft that twists"), ("backlash", "backlash")];
 
-/// Look-alikes of a cause that no log of references and positions distinguishes from it, and effects that such logs cannot test beside it.
+/// Look-alikes of a cause that no log of references and positions distinguishes from it, and effects that such logs cannot test for and that change
+/// the motion as the cause does.
 pub(in crate::serial) fn behind_controller(
     cause: &Cause,
     controller: &PositionController,

@@ -101,8 +101,8 @@ impl Search<'_> {
         Term::common(members).with(Term::common(noticed.to_vec()).p)
     }
 
-    /// Those members, one for each joint, of the term of index `last` in the model `with` that are significant on the training logs, large enough to
-    /// matter, and on whose joint this model has a lower holdout cost than the model `without` the term.
+    /// Those members, one for each joint, of the term of index `last` in the model `with` that are significant on the training logs, have a relative
+    /// RMS torque above [`CONSEQUENCE`], and on whose joint this model has a lower holdout cost than the model `without` the term.
     fn noticed(&self, regression: &Regression, without: &Fitted, with: &Fitted, last: usize) -> Vec<Term> {
         let held = |set: &Fitted, joint: usize| set.costs[1][joint - 1].iter().sum::<f64>();
         let is_noticed = |member: &Term| {
@@ -119,8 +119,8 @@ impl Search<'_> {
         with.terms[last].members().into_iter().filter(is_noticed).collect()
     }
 
-    /// Whether the last term of the model `with`, on its joints other than the one where its law explains most, is accepted beside the same law on
-    /// that joint.
+    /// Whether the last term of the model `with`, on its joints other than the one where its law explains most, is accepted in addition to the same
+    /// law on that joint.
     fn is_more_than_on_one_joint(&self, regression: &Regression, model: &Fitted, with: &Fitted) -> bool {
         let last = model.terms.len();
         let fell = |term: &Term| {

@@ -26,7 +26,7 @@ impl Search<'_> {
                 .total_cmp(&(a.evidence.gain + a.evidence.holdout_gain))
         });
         let tested = self.tested(guesses, regression, &model);
-        // Re-estimated costs are comparable only under the same weights.
+        // Costs of the re-estimated and of the final model are comparable only under the same weights of the rows.
         let refit = if model.terms.is_empty() {
             refit
         } else {
@@ -46,8 +46,8 @@ impl Search<'_> {
         }
     }
 
-    /// The model with its links' parameters moved towards the arm file's until the inertia matrix is positive definite, and rotor inertias and
-    /// friction estimated again.
+    /// The model with its links' parameters moved towards the arm file's until the inertia matrix is well conditioned ([`Search::is_feasible`]), and
+    /// with rotor inertias and friction estimated again.
     fn feasible(&self, regression: &Regression, model: Fitted) -> Fitted {
         if (self.is_feasible)(&model.estimate.theta) {
             return model;
@@ -109,7 +109,8 @@ impl Search<'_> {
                 || vec![f64::INFINITY; term.p.len()],
                 |score| {
                     let covariance = regression.sandwich(&model.estimate, &columns, &score);
-                    // Blocks do not show how far the arm file's values are off; the information does, which holds their prior.
+                    // The scatter over blocks does not contain the uncertainty of the arm file's values; the inverse of the information with their
+                    // prior does.
                     let variance = |i: usize| covariance[(i, i)].max(score.inverse()[(i, i)]).max(0.0);
                     (0..term.p.len()).map(|i| variance(i).sqrt()).collect()
                 },
@@ -124,7 +125,7 @@ impl Search<'_> {
         Named { term, sigma, evidence, probability: wins * trust, alike }
     }
 
-    /// First-order tests, beside the model, of every candidate whose joint and effect are not in the model.
+    /// First-order tests, in addition to the terms of the model, of every candidate whose joint and effect are not in the model.
     fn tested(&self, guesses: &[Vec<Guess>], regression: &Regression, model: &Fitted) -> Vec<Tested> {
         let screened = self.screened(guesses, regression, model);
         let open = self.candidates.iter().filter_map(|group| group.first());

@@ -63,7 +63,7 @@ impl Search<'_> {
     /// On the holdout, the residuals of the model without the term are regressed on the part of them that the term removes: a slope of one says that
     /// the effect has the size that the training logs gave it, a slope of zero that it is absent. Only joints that the term acts on count, as the
     /// scatter of the other joints' parameters says nothing about the term. The slope's standard deviation comes from the scatter of the blocks'
-    /// scores. How unevenly an effect is spread over the blocks does not count against the effect: a stop may be met twice in a log.
+    /// scores. How unevenly an effect is spread over the blocks does not count against the effect: a joint limit may be reached only twice in a log.
     pub(in crate::serial) fn evidence(
         &self,
         regression: &Regression,
@@ -131,7 +131,8 @@ pub(in crate::serial) fn consequence(rows: &Rows, signal: &Signal) -> f64 {
     rows.joints.iter().zip(signal).map(of).fold(0.0, f64::max)
 }
 
-/// Share of resamples of the blocks of training logs and holdout in which a model costs less than each of the models `rivals`, 0 to 1.
+/// Share of resamples of the blocks of training logs and holdout in which the cost of a model, plus two per effective parameter, is below that of
+/// each of the models `rivals`, 0 to 1.
 pub(in crate::serial) fn stability(model: &Fitted, rivals: &[&Fitted], seed: u64) -> f64 {
     let by_block = |fitted: &Fitted| -> Vec<f64> {
         fitted

@@ -100,7 +100,7 @@ impl Search<'_> {
         Fitted { terms, estimate, costs, held }
     }
 
-    /// Estimate of the arm's parameters beside terms at fixed values, with the cost scaled to the torque that reaches the joints.
+    /// Estimate of the arm's parameters with terms added at fixed values, with the cost scaled to the torque that reaches the joints.
     pub(in crate::serial) fn estimated(
         &self,
         regression: &Regression,

@@ -37,9 +37,10 @@ pub struct Search<'a> {
     pub rotary: Vec<bool>,
     /// Sample period, s. A delay or lag below it is an artefact of how torques and positions were sampled, and is not named.
     pub period: f64,
-    /// Function that tells whether given parameters of the arm have a positive definite inertia matrix along the logs.
+    /// Function that tells whether the inertia matrix along the logs, at given parameters of the arm, is conditioned well enough for simulation
+    /// (`CONDITIONED`).
     pub is_feasible: &'a (dyn Fn(&[f64]) -> bool + Sync),
-    /// Reporter of the search's progress, which also takes cancellation.
+    /// Reporter of the search's progress, through which the search may be cancelled.
     pub progress: &'a ProgressReporter,
 }
 
@@ -62,7 +63,7 @@ pub struct Named {
 /// Result of the first-order test of a candidate that is not in the final model.
 #[derive(Debug, Clone)]
 pub struct Tested {
-    /// Candidate term at the best of its initial guesses.
+    /// Candidate term at the values of its best first-order test, or at its first initial guess where no test lowers the cost.
     pub term: Term,
     /// Estimated size of the candidate and the size's robust standard deviation, both as factors on the torque of the term at its values.
     pub size: [f64; 2],
@@ -74,7 +75,7 @@ pub struct Tested {
 pub struct Found {
     /// The model without terms, with the arm's parameters re-estimated.
     pub refit: Fitted,
-    /// The re-estimated model without terms whose inertia matrix is positive definite, for predictions.
+    /// The model without terms, re-estimated such that its inertia matrix is well conditioned ([`Search::is_feasible`]), for predictions.
     pub refit_feasible: Fitted,
     /// The final model with all terms that the search accepted.
     pub model: Fitted,
@@ -82,14 +83,14 @@ pub struct Found {
     pub named: Vec<Named>,
     /// The model with only those terms that are probable enough to be named, for predictions.
     pub reported: Fitted,
-    /// First-order tests, beside the final model, of all candidates that are not in it.
+    /// First-order tests, in addition to the terms of the final model, of all candidates that are not in this model.
     pub tested: Vec<Tested>,
     /// Standard deviations of the arm's parameters, SI: of the re-estimated model without terms, and of the final model.
     pub sigma: [Vec<f64>; 2],
 }
 
 impl Search<'_> {
-    /// Runs the model search with at most `most` additions of a term; `seed` starts the random numbers with which blocks of the logs are resampled.
+    /// Runs the model search with at most `most` additions of a term; `seed` is of the random numbers with which blocks of the logs are resampled.
     pub fn run(&self, most: usize, seed: u64) -> Found {
         self.progress.begin(Phase::Refit, 1);
         let none = vec![None; self.rotary.len()];
@@ -146,7 +147,7 @@ impl Search<'_> {
         self.fit(regression, terms, &model.estimate.theta)
     }
 
-    /// The model without those of its terms, the last one excepted, that are no longer accepted beside the model's other terms.
+    /// The model without those of its terms, the last one excepted, that are no longer accepted in addition to the model's other terms.
     fn without_idle(&self, regression: &Regression, model: Fitted) -> Fitted {
         let mut model = model;
         let mut index = 0;

@@ -66,7 +66,7 @@ impl Search<'_> {
 
     /// Effective number of a term's parameters (Moody 1992). Of a link or payload, which the arm's parameters can imitate, only directions that the
     /// logs determine better than the arm file count: `trace(I diag(sigma)^2)` with `sigma` the arm file's standard deviations and `I` the
-    /// information on the term's parameters beside the arm's parameters.
+    /// information on the term's parameters when the arm's parameters are estimated too.
     fn degrees(&self, regression: &Regression, at: &Estimate, term: &Term, columns: &[Signal]) -> f64 {
         let link = match term.kind {
             TermKind::NominalLink(link) => link,
@@ -81,8 +81,8 @@ impl Search<'_> {
         })
     }
 
-    /// Tests a term to first order; returns the term with the values that the test suggests, and by how much they lower the cost, or `None` if they
-    /// lie out of bounds or do not lower it.
+    /// Tests a term to first order; returns the term with the values that the test suggests, and by how much these values lower the cost, or `None`
+    /// if they are out of bounds or do not lower the cost.
     pub(in crate::serial) fn test(
         &self,
         regression: &Regression,
@@ -126,12 +126,12 @@ impl Search<'_> {
         let size = score.size[0];
         let information = score.gain / (size * size).max(f64::MIN_POSITIVE);
         let (p, size) = match trial {
-            // The torque of a stop is in proportion to its stiffness and damping.
+            // The torque of a joint limit is in proportion to its stiffness and damping.
             Trial::Whole if matches!(term.kind, TermKind::Law(effect) if effect.is_contact()) => {
                 let share = size.clamp(0.0, FARTHEST);
                 (vec![term.p[0], share * term.p[1], share * term.p[2]], share)
             }
-            // A threshold has no small version of itself.
+            // The torque of an effect with a threshold is not in proportion to its values, which stay at the initial guess.
             Trial::Whole => (term.p.clone(), 1.0),
             Trial::Ray => {
                 let share = size.clamp(0.0, FARTHEST);
@@ -216,7 +216,7 @@ impl Search<'_> {
 }
 
 /// First-order test of the inertia and friction of a transmission that couples two joints, with parameters that would be negative set to zero;
-/// returns the term with the values that the test suggests, and by how much they lower the cost.
+/// returns the term with the values that the test suggests, and by how much these values lower the cost.
 fn test_row(regression: &Regression, at: &Estimate, guess: &Guess, row: RowTerm) -> Option<(Term, f64)> {
     let mut free: Vec<usize> = (0..guess.columns.len()).collect();
     loop {

@@ -14,7 +14,7 @@ use crate::serial::term::transmission::TransmissionLaw;
 use armgap_core::chain::LINK_NAMES;
 use armgap_core::effect::{JointPoint, Quantity, Scope, Trial};
 
-/// A term of a serial arm's model beside the nominal arm, with values of its parameters.
+/// A term that is added to the model of the nominal serial arm, with values of its parameters.
 #[derive(Debug, Clone)]
 pub struct Term {
     /// Kind of the term.
@@ -220,7 +220,7 @@ impl Term {
         }
     }
 
-    /// Whether the model search tries the term on every joint by itself.
+    /// Whether the model search tries the term on each joint separately.
     pub fn is_of_a_joint(&self) -> bool {
         match self.kind {
             TermKind::Law(effect) => effect.law.spec().scope == Scope::Joint,

@@ -15,7 +15,7 @@ use armgap_core::kinematics::{JointState, RigidArm};
 use nalgebra::SVector;
 use rayon::prelude::*;
 
-/// Length of a block of a log, s: the torque that the model lacks may be correlated within a block, not beyond.
+/// Length of a block of a log, s: residual torques may be correlated within a block, and are taken as uncorrelated beyond it.
 const BLOCK_S: f64 = 1.0;
 
 /// Integral of a test function over the time at rest of a joint, 0 to 1, above which the test function gives no row for the joint.

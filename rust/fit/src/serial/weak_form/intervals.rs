@@ -31,7 +31,7 @@ const AT_REST: f64 = 3.0;
 /// level. At a reversal with a tenth of the largest acceleration a joint is this slow for only some milliseconds.
 const SLOW: f64 = 0.01;
 
-/// Time between two samples, in sample periods, beyond which the log counts as interrupted: no test function reaches across.
+/// Time between two samples, in sample periods, beyond which the log counts as interrupted: no test function extends over the interruption.
 const GAP: f64 = 3.5;
 
 /// State in the middle of a sample interval and mean torque over it, by joint.

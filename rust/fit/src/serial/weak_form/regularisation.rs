@@ -6,7 +6,7 @@
 use crate::serial::constants::PRICE;
 use crate::serial::weak_form::rows::{Prior, Regression, Rows};
 
-/// Widths of friction regularisation that are tried besides dry friction, rad/s (m/s).
+/// Widths of friction regularisation that are tried as alternatives to dry friction, rad/s (m/s).
 const WIDTHS: [f64; 7] = [0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2];
 
 /// Width of friction regularisation by joint, rad/s (m/s), zero for dry friction.

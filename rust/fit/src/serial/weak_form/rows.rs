@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 /// Largest lag, in rows, over which residuals count as correlated, a quarter of a second: disturbances are correlated over 0.05 to 0.3 s, and a
-/// longer correlation comes from what the model lacks.
+/// longer correlation comes from torques that are missing in the model.
 const LONGEST_CORRELATION: usize = 10;
 
 /// Number of rounds in which parameters are estimated and the rows' weights computed from the residuals.
@@ -227,7 +227,8 @@ impl<'a> Regression<'a> {
         self.prior.sigma.iter().map(|s| *s <= 0.0).collect()
     }
 
-    /// Estimates the parameters with the torque `beside` added to theirs; coefficients that would be negative and may not be are held at zero.
+    /// Estimates the parameters with the torque `beside` added to the torque of the parameters; [`Prior::positive`] parameters are held at zero where
+    /// they would be negative.
     pub fn estimate(&self, beside: &Signal) -> Estimate {
         let p = self.rows.parameters;
         let torque: Signal = self
@@ -356,7 +357,7 @@ impl Score {
     }
 }
 
-/// Result of a first-order test of torques that are added to that of the parameters.
+/// Result of a first-order (score) test of torques that are added to the torque of the parameters.
 #[derive(Debug, Clone)]
 pub struct Score {
     /// Estimated sizes of the tested torques, as factors on these torques.
@@ -367,7 +368,7 @@ pub struct Score {
     information: DMatrix<f64>,
     /// Inverse of the information matrix plus the prior precision of the sizes.
     inverse: DMatrix<f64>,
-    /// Change of the parameters that comes closest to each tested torque.
+    /// Change of the parameters whose torque comes closest, by weighted least squares, to each tested torque.
     solved: Vec<DVector<f64>>,
 }
 
@@ -452,7 +453,7 @@ mod tests {
         let clean = base.joints[0].y.clone();
         let mut outside = 0;
         for _ in 0..200 {
-            // Noise with a memory of several rows.
+            // Noise that is correlated over several rows.
             let mut memory = 0.0;
             for (y, clean) in base.joints[0].y.iter_mut().zip(&clean) {
                 memory = 0.7 * memory + 0.1 * random.normal();
@@ -481,7 +482,7 @@ mod tests {
             })
             .collect();
         assert!(correlation_length(&white) < 1.3);
-        // Of a first-order process (1 + a) / (1 - a).
+        // The correlation length of a first-order autoregressive process is (1 + a) / (1 - a).
         assert!(
             (correlation_length(&coloured) / 9.0 - 1.0).abs() < 0.35,
             "{}",
