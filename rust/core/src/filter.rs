@@ -106,7 +106,8 @@ pub struct CachedCoefficients<T> {
     step: FilterCoefficients<T>,
 }
 
-/// Relative change of a filter's decay below which two sample intervals count as equally long; the estimates follow the decay to first order.
+/// Relative change of a filter's decay over one interval below which two sample intervals count as equally long; the parameters estimated from the
+/// filtered signals then change by about as little.
 const SAME: f64 = 1e-12;
 /// Relative change of a filter's decay up to which three terms of the series of `exp` suffice: the fourth is 4e-18.
 const NEAR_DECAY: f64 = 1e-4;

@@ -12,7 +12,7 @@ pub struct ControllerTerm {
     pub joint: usize,
 }
 
-/// Settings of a position controller whose errors a log of references and positions can show.
+/// Setting of a position controller that may be shown by a log of references and positions to differ from the arm file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Setting {
     /// Proportional gain `kp`; the parameter is a factor on the arm file's value.
