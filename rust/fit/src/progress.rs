@@ -169,12 +169,12 @@ impl ProgressReporter {
 pub fn guarded<T>(task: impl FnOnce() -> T) -> Option<T> {
     match catch_unwind(AssertUnwindSafe(task)) {
         Ok(result) => Some(result),
-        Err(cause) if is_contact(cause.as_ref()) => None,
+        Err(cause) if is_cancellation(cause.as_ref()) => None,
         Err(cause) => resume_unwind(cause),
     }
 }
 
-fn is_contact(cause: &(dyn Any + Send)) -> bool {
+fn is_cancellation(cause: &(dyn Any + Send)) -> bool {
     cause.is::<Stopped>()
 }
 
