@@ -379,7 +379,7 @@ def _against_look_alikes(
 
 
 def _urgency(tested: TestedQuestion) -> tuple[int, float]:
-    """Return the sort key of a question: causes against equivalents first, then by consequence."""
+    """Return the sort key of a question: causes against equivalents, then candidates, then the rest; in each, the largest prediction error first."""
     first = min(rank(tested.question), 2)
     return first, -min(tested.consequence, 1e9)
 

@@ -120,7 +120,7 @@ class CorrectedPlanar(Corrected):
         return SimulatorModel(self.arm.name, chain, inertial, joints, self.arm.sample_period, tip)
 
     def nominal(self) -> Arm:
-        """Return the arm with the corrected base parameters; a rotor inertia of the first joint is part of theta1."""
+        """Return the arm with this corrected model's base parameters as nominal ones; the rotor inertia of joint 1 is added to the first of them."""
         theta = self.theta.copy()
         theta[0] += self.joints[0].armature
         scale = np.where(theta != 0, np.abs(theta), np.max(np.abs(theta)))

@@ -62,7 +62,8 @@ pub struct ChainSettings<'a, T> {
     /// Estimated parameters, strictly ascending, as indices into the arm's 13 parameters per joint ([`crate::chain::parameter`]); `13 n + j` is a
     /// constant torque of joint `j`, `n` the number of joints.
     pub columns: &'a [usize],
-    /// Known values of the 13 parameters per joint, SI, used for parameters that are not estimated; empty for zeros.
+    /// Values, SI, of all 13 parameters per joint (ten inertial, rotor inertia, viscous and Coulomb friction) in the order of
+    /// [`crate::chain::parameter`]; used for the parameters that are not estimated. Empty for zeros.
     pub known: &'a [T],
 }
 

@@ -67,7 +67,7 @@ struct PushedMotion<'a> {
 /// An effect on a joint that may replace some of the pushes.
 struct Trial {
     law: &'static LawGuess,
-    /// First guesses of the effect, one from each push that it may replace.
+    /// The effect `law` on one joint with first guesses of its parameters: one guess from each push in `theirs`.
     guesses: Vec<EffectInstance>,
     /// Pushes that the effect may replace.
     theirs: Vec<Disturbance>,

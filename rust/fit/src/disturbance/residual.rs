@@ -69,7 +69,7 @@ pub struct Joint {
 
 /// Residual torque of a log and all that is needed to explain it by model errors.
 pub struct Residual<const N: usize> {
-    /// Times of the regular grid, s.
+    /// Times of the regular grid onto which the residual torque is low-passed, s.
     pub t: Vec<f64>,
     /// Spacing of the regular grid of times, s.
     pub step: f64,

@@ -38,7 +38,8 @@ const LEAST: f64 = 1e-9;
 pub struct Noise {
     /// Standard deviation of the position measurement, rad or m.
     pub sigma: f64,
-    /// Whether successive samples show clearly more noise than another series of samples, as positions held over several rows do.
+    /// Whether the positions seem to be held over several rows: samples further apart, or the rows at which the position changes, give a clearly
+    /// smaller estimate of the noise than successive rows.
     pub is_held: bool,
 }
 

@@ -45,7 +45,7 @@ pub struct Headline<const N: usize, const P: usize> {
     pub causes: Vec<Cause>,
     /// Named external disturbances, the largest impulse in its standard deviations first.
     pub disturbances: Vec<Disturbance>,
-    /// Causes that were found and are not named, with reasons.
+    /// Effects that the model search accepted but the diagnosis does not name, each with the reason why not.
     pub candidates: Vec<Unnamed<Cause>>,
     /// External disturbances that were found and are not named, with reasons.
     pub disturbance_candidates: Vec<Unnamed<Disturbance>>,
