@@ -1,4 +1,4 @@
-"""One spoilt case diagnosed: files in a folder of their own, the public `armgap.diagnose`, a record of what came."""
+"""Diagnosis of one case with a defect: files in a temporary folder, the public `armgap.diagnose`, and a record of the answer."""
 
 from __future__ import annotations
 
@@ -21,26 +21,26 @@ from .making import Kept, read
 from .true_floor import Starts, measured_again, true_floor
 
 Record = dict[str, Any]
-#: Of the name of a record without any defect.
+#: Name of the defect in the record of a case that has no defect.
 WHOLE = "none"
-#: Least and largest white noise beside an encoder's rounding [counts].
+#: Smallest and largest standard deviation of white noise that is added to positions before the encoder rounds them [counts].
 NOISE = (0.5, 10.0)
-#: Differences from the schema, and losses in reading, that a record keeps at most.
+#: Largest number of differences from the JSON Schema, and of losses in reading, that a record keeps.
 PROBLEMS = 10
 CAUSE = ("effect", "joint", "probability", "equivalents")
 
 
 def answer(folder: str, defect: str, seed: int) -> Record:
-    """Spoil a case, diagnose it, and return what is to be kept: the answer, and what it should have been.
+    """Put a defect into a case, diagnose the case, and return the record: the answer, and what it should have been.
 
     Parameters
     ----------
     folder : str
-        Of a case that was made.
+        Folder of a case that `making.make` has made.
     defect : str
-        Name in the catalogue, or :data:`WHOLE`.
+        Name of the defect in the catalogue, or :data:`WHOLE` for none.
     seed : int
-        With the names of case and defect it decides everything random about the defect.
+        Seed that, with the names of case and defect, decides everything random about the defect.
     """
     case = read(Path(folder))
     record: Record = {**about(case), "version": build(), "defect": defect}
@@ -54,12 +54,12 @@ def answer(folder: str, defect: str, seed: int) -> Record:
 
 
 def spoilt(case: Kept, defect: str, seed: int) -> tuple[Inputs, Expected]:
-    """The inputs with a defect, and what the answer has to say.
+    """Return the inputs of a case with a defect put into them, and what the answer has to say.
 
     Raises
     ------
     NotApplicableError
-        The arm does not have the defect, or the hidden effect is of its kind.
+        If the defect does not exist on this kind of arm, or the hidden effect equals or hides the defect.
     """
     d = DEFECTS[defect]
     if case.truth.kind not in d.kinds:
@@ -72,7 +72,7 @@ def spoilt(case: Kept, defect: str, seed: int) -> tuple[Inputs, Expected]:
 
 @cache
 def build() -> str:
-    """Version of armgap with a mark of its files: answers of another build are given again."""
+    """Return armgap's version with a hash of its files, by which answers of another build are recognised and given again."""
     import armgap
 
     folder = Path(armgap.__file__).parent
@@ -82,7 +82,7 @@ def build() -> str:
 
 
 def answer_floor(folder: str, defect: str, seed: int) -> Record:
-    """Diagnose a case whose noise is known, half of them with more of it than rounding, and compute its true floor."""
+    """Diagnose a case and compute its true noise floor; in half of the cases white noise is added to the encoder's rounding."""
     case = read(Path(folder))
     rng = np.random.default_rng([seed, zlib.crc32(f"{case.name}/noise".encode())])
     counts = float(np.exp(rng.uniform(*np.log(NOISE)))) if rng.uniform() < 0.5 else 0.0
@@ -90,14 +90,14 @@ def answer_floor(folder: str, defect: str, seed: int) -> Record:
     case = measured_again(case, noise, rng)
     answered, cut = diagnosed(case.inputs)
     record = {**about(case), "version": build(), "defect": defect, "noise_counts": counts, **answered}
-    # A log that is cut crosswise has another holdout, of which the true arm is not run.
+    # A log that is divided into training and holdout stretches has another holdout, for which no true floor is computed.
     if cut.keys() == case.inputs.holdout.keys():
         record["true"] = true_floor(case, cut)
     return record
 
 
 def about(case: Kept) -> Record:
-    """What a record says of its case."""
+    """Return the entries of a record that describe its case: arm, hidden effects, visibility, sample period."""
     return {
         "case": case.name,
         "model": case.truth.model,
@@ -111,7 +111,7 @@ def about(case: Kept) -> Record:
 
 
 def diagnosed(inputs: Inputs) -> tuple[Record, dict[str, Starts]]:
-    """Write the inputs, diagnose them, and record the answer or the refusal; and where the windows of the holdout start."""
+    """Write the inputs as files and diagnose them; return the answer or the refusal, and the starts of the holdout's windows by log."""
     import armgap
 
     with tempfile.TemporaryDirectory() as place:
@@ -130,7 +130,7 @@ def diagnosed(inputs: Inputs) -> tuple[Record, dict[str, Starts]]:
 
 @cache
 def _schema() -> Any:
-    """What holds a diagnosis against its schema: a package beside this one, wherever both are imported from."""
+    """Return the module `diagnosis_schema.checking`, which compares a diagnosis with its JSON Schema, from the folder of this package."""
     beside = (__package__ or "").rpartition(".")[0]
     return import_module(f"{beside}.diagnosis_schema.checking" if beside else "diagnosis_schema.checking")
 
@@ -159,7 +159,7 @@ def _kept(found: dict[str, Any]) -> Record:
 
 
 def _starts(series: list[dict[str, Any]]) -> dict[str, Starts]:
-    """Starts of the windows of every drawn holdout log."""
+    """Return the starts of the windows of every holdout log that the diagnosis has a series of, by log."""
     logs: dict[str, list[dict[str, Any]]] = {}
     for joint in series:
         logs.setdefault(joint["log"], []).append(joint)

@@ -1,4 +1,4 @@
-"""What a defect acts on: tables of samples, an arm file as a dictionary, and the truth behind both."""
+"""Data of a case that a defect changes: tables of samples and an arm file as a dictionary; and the true arm."""
 
 from __future__ import annotations
 
@@ -12,26 +12,26 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-#: Places of the gravity terms among the inertial parameters of each kind of arm.
+#: Indices of the gravity terms among the inertial parameters, by kind of arm.
 GRAVITY_TERMS = {"axis": (1,), "pendulum": (1,), "two-link": (3, 4)}
 
 
 class NotApplicableError(Exception):
-    """The defect does not exist on this case, or is no defect there."""
+    """Exception for a defect that a case cannot have, or that would be no defect in that case."""
 
 
 @dataclass(frozen=True)
 class Table:
-    """One log.
+    """Samples of one log, with the true motion.
 
     Attributes
     ----------
     t : ndarray, shape (n_samples,)
-        Stamps [s].
+        Time stamps [s].
     q, tau : ndarray, shape (n_samples, n_joints)
-        Columns of the log.
+        Positions [rad or m] and torques [N m or N] as the log has them.
     q_true, dq_true : ndarray, shape (n_samples, n_joints)
-        True motion; not in the log.
+        True positions and velocities, which are not in the log [rad or m, and per second].
     """
 
     t: Array
@@ -41,28 +41,28 @@ class Table:
     dq_true: Array
 
     def column(self, name: str) -> Array:
-        """Column ``q1``, ``tau2`` and so on."""
+        """Return one column of the log by its name, ``q1``, ``tau2`` and so on."""
         group, index = _split(name)
         values: Array = getattr(self, group)[:, index]
         return values
 
     def with_column(self, name: str, values: Array) -> Table:
-        """The table with other values in one column."""
+        """Return the table with other values in one column."""
         group, index = _split(name)
         block = getattr(self, group).copy()
         block[:, index] = values
         return self.changed(**{group: block})
 
     def changed(self, **groups: Array) -> Table:
-        """The table with other values in ``t``, ``q`` or ``tau``."""
+        """Return the table with other values in ``t``, ``q`` or ``tau``."""
         return replace(self, **groups)
 
     def rows(self, rows: slice) -> Table:
-        """Some of the rows, with the times of the table."""
+        """Return the table of a slice of the rows, with unchanged time stamps."""
         return Table(*(getattr(self, name)[rows] for name in ("t", "q", "tau", "q_true", "dq_true")))
 
     def frame(self) -> pl.DataFrame:
-        """The log as it is written."""
+        """Return the columns of the log as they are written to its file."""
         columns = {"t": self.t}
         for group in ("q", "tau"):
             columns |= {f"{group}{j + 1}": x for j, x in enumerate(getattr(self, group).T)}
@@ -75,14 +75,14 @@ def _split(name: str) -> tuple[str, int]:
 
 @dataclass(frozen=True)
 class Inputs:
-    """What the diagnosis is given: logs to learn from, logs to judge on, an arm file."""
+    """Inputs of a diagnosis: training logs and holdout logs by name, and the arm file as a dictionary."""
 
     training: Mapping[str, Table]
     holdout: Mapping[str, Table]
     arm: Mapping[str, Any]
 
     def each(self, change: Callable[[Table], Table], where: str = "both") -> Inputs:
-        """Change every log of ``"both"`` groups, of ``"training"`` or of ``"holdout"``."""
+        """Return the inputs with `change` applied to every log of both groups (``"both"``), of ``"training"`` or of ``"holdout"``."""
 
         def group(name: str, logs: Mapping[str, Table]) -> dict[str, Table]:
             return {k: change(x) if where in ("both", name) else x for k, x in logs.items()}
@@ -90,12 +90,12 @@ class Inputs:
         return replace(self, training=group("training", self.training), holdout=group("holdout", self.holdout))
 
     def one(self, name: str, change: Callable[[Table], Table]) -> Inputs:
-        """Change one log."""
+        """Return the inputs with `change` applied to one log."""
 
         return self.with_log(name, change(self.logs[name]))
 
     def with_log(self, name: str, table: Table) -> Inputs:
-        """The same inputs with another table in the place of one log."""
+        """Return the inputs with another table in the place of one log."""
 
         def group(logs: Mapping[str, Table]) -> dict[str, Table]:
             return {k: table if k == name else x for k, x in logs.items()}
@@ -104,24 +104,24 @@ class Inputs:
 
     @property
     def logs(self) -> dict[str, Table]:
-        """All logs by name."""
+        """Tables of all logs, training and holdout, by name."""
         return {**self.training, **self.holdout}
 
     def with_arm(self, table: str, **values: Any) -> Inputs:
-        """The same logs beside an arm file with other values in one of its tables."""
+        """Return the inputs with other values in one table of the arm file; the logs are unchanged."""
         return replace(self, arm={**self.arm, table: {**self.arm[table], **values}})
 
 
 @dataclass(frozen=True)
 class Truth:
-    """What nobody tells the diagnosis.
+    """True arm of a case, which the diagnosis is not told.
 
     Attributes
     ----------
     model, kind : str
-        Machine, and kind of its arm file.
+        Name of the trial's arm model, and kind of its arm file.
     theta : ndarray, shape (n_parameters,)
-        True parameters: inertial, viscous, Coulomb.
+        True parameters: inertial, then viscous, then Coulomb.
     step, limit : ndarray, shape (n_joints,)
         Encoder steps [rad or m] and torque limits [N m or N].
     period : float
@@ -142,7 +142,7 @@ class Truth:
 
     @property
     def inertial(self) -> Array:
-        """Inertial parameters."""
+        """True inertial parameters."""
         return self.theta[: len(self.theta) - 2 * self.n_joints]
 
     @property
@@ -151,7 +151,7 @@ class Truth:
         return bool(np.any(self.inertial[list(GRAVITY_TERMS[self.kind])] != 0))
 
     def gravity(self, q: Array) -> Array:
-        """Gravity torques at positions, shape (n_samples, n_joints)."""
+        """Return the gravity torques at the given positions [N m or N], shape (n_samples, n_joints)."""
         theta = self.inertial
         if self.kind == "axis":
             return np.full_like(q, theta[1])
@@ -162,7 +162,7 @@ class Truth:
 
 
 def toml(arm: Mapping[str, Any]) -> str:
-    """Text of an arm file."""
+    """Return the TOML text of an arm file."""
     scalars = {k: v for k, v in arm.items() if not isinstance(v, Mapping)}
     tables = {k: v for k, v in arm.items() if isinstance(v, Mapping)}
     lines = [f"{k} = {_value(v)}" for k, v in scalars.items()]

@@ -1,9 +1,9 @@
 """Defects of convention: signs, order of joints, relative angles, zeros, gravity.
 
-Which remedies no log tells apart follows from the equation of motion ``M ddq + C dq + g + f = tau``:
+Which remedies no log can distinguish follows from the equation of motion ``M ddq + C dq + g + f = tau``:
 
-* ``(q, tau) -> (-q, -tau)`` leaves it as it is, where gravity is odd in q: all torques flipped are all positions flipped.
-  On an inclined axis gravity is a constant, and only the right one of the two is asked for.
+* ``(q, tau) -> (-q, -tau)`` leaves the equation unchanged where gravity is odd in q: all torques flipped equal all positions flipped.
+  On an inclined axis gravity is a constant, and only the remedy that flips the changed columns is asked for.
 * ``q1 -> q1 + pi`` turns the sign of every gravity term and nothing else.
 """
 
@@ -23,7 +23,7 @@ Result = tuple[Inputs, Expected]
 
 
 def conventions() -> Iterator[Defect]:
-    """All of them."""
+    """Yield the defects of convention."""
     for group, check in (("tau", "torque_sign"), ("q", "position_sign")):
         yield Defect(f"{check}:{group}1", partial(flipped, columns=(f"{group}1",)), changes=(group,))
         yield Defect(f"{check}:{group}2", partial(flipped, columns=(f"{group}2",)), TWO_LINK, (group,))
@@ -40,7 +40,7 @@ def conventions() -> Iterator[Defect]:
 
 
 def flipped(inputs: Inputs, truth: Truth, _: np.random.Generator, *, columns: tuple[str, ...]) -> Result:
-    """Columns of the other sign."""
+    """Turn the sign of the given columns over."""
 
     def change(x: Table) -> Table:
         for name in columns:
@@ -61,19 +61,19 @@ def flipped(inputs: Inputs, truth: Truth, _: np.random.Generator, *, columns: tu
 
 
 def exchanged(inputs: Inputs, truth: Truth, _: np.random.Generator, *, groups: tuple[str, ...]) -> Result:
-    """Columns of the two joints in each other's place."""
+    """Exchange the columns of the two joints."""
     swapped = inputs.each(lambda x: x.changed(**{group: getattr(x, group)[:, ::-1].copy() for group in groups}))
     return swapped, Expected(("joint_order",), ("error",), (" ".join(f"--swap {g}1,{g}2" for g in groups),))
 
 
 def counted(inputs: Inputs, truth: Truth, _: np.random.Generator, *, sign: float, option: str) -> Result:
-    """Joint 2 counted from the world (``q1 + q2``), or link 1's angle taken off once too often (``q2 - q1``)."""
+    """Log joint 2's angle against the world (``q1 + q2``), or with joint 1's angle subtracted once too often (``q2 - q1``)."""
     changed = inputs.each(lambda x: x.with_column("q2", x.column("q2") + sign * x.column("q1")))
     return changed, Expected(("relative_angle",), ("error",), (f"--{option} q2",))
 
 
 def displaced(inputs: Inputs, truth: Truth, _: np.random.Generator, *, joint: int, angle: int) -> Result:
-    """A joint whose zero lies at `angle` of the model's: from horizontal 90 or -90, from upright 180."""
+    """Move the zero of a joint's column to `angle` [deg] of the model's angle: 90 or -90 for horizontal, 180 for upright."""
     name = f"q{joint}"
     changed = inputs.each(lambda x: x.with_column(name, x.column(name) - math.radians(angle)))
     right = f"--zero {name}={angle}deg"
@@ -84,7 +84,7 @@ def displaced(inputs: Inputs, truth: Truth, _: np.random.Generator, *, joint: in
 
 
 def turned_gravity(inputs: Inputs, truth: Truth, _: np.random.Generator) -> Result:
-    """An arm file whose gravity terms have the other sign."""
+    """Turn the sign of the gravity terms in the arm file over."""
     if not truth.weighs:
         raise NotApplicableError("no gravity along the joint")
     theta = np.array(inputs.arm["inertial"]["theta"], dtype=float)
@@ -97,7 +97,7 @@ def turned_gravity(inputs: Inputs, truth: Truth, _: np.random.Generator) -> Resu
 
 
 def compensated(inputs: Inputs, truth: Truth, _: np.random.Generator) -> Result:
-    """Torques logged after a controller's gravity compensation was taken off, at the positions it measured."""
+    """Subtract a controller's gravity compensation, computed at the measured positions, from the logged torques."""
     if not truth.weighs:
         raise NotApplicableError("no gravity along the joint")
     changed = inputs.each(lambda x: x.changed(tau=x.tau - truth.gravity(x.q)))

@@ -1,4 +1,4 @@
-"""One way to spoil a case."""
+"""Type of a defect: one way to make the inputs of a case wrong."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ Apply = Callable[[Inputs, Truth, np.random.Generator], tuple[Inputs, Expected]]
 
 @dataclass(frozen=True)
 class Defect:
-    """One way to spoil a case.
+    """One way to make the inputs of a case wrong.
 
     Attributes
     ----------
     name : str
-        Check and variant, ``check:variant``.
+        Name of the check that should find the defect, and of the variant: ``check:variant``.
     apply : callable
-        ``apply(inputs, truth, rng)`` gives the spoilt inputs and what the answer has to say; inputs stay as they are.
-        Raises `NotApplicableError` where a case has no such defect.
+        ``apply(inputs, truth, rng)`` returns the inputs with the defect and what the answer has to say; it leaves `inputs` unchanged
+        and raises `NotApplicableError` where the case cannot have the defect.
     kinds : tuple of str
-        Kinds of arm it exists on.
+        Kinds of arm on which the defect exists.
     changes : tuple of str
-        What it changes: of ``t``, ``q``, ``tau``, ``arm``, ``rows`` (their number), ``holdout`` (which log that is).
+        Parts of the inputs that the defect changes: ``t``, ``q``, ``tau``, ``arm``, ``rows`` (number of rows), ``holdout`` (which log it is).
     conflicts : tuple of str
-        Hidden effects that it equals or hides, so that either answer is right.
+        Hidden effects that the defect equals or hides, so that either answer is right.
     """
 
     name: str
@@ -45,5 +45,5 @@ class Defect:
 
     @property
     def check(self) -> str:
-        """What comes before the variant: the check that has it, or ``arm_file``, ``other_arm``."""
+        """Part of the name before the variant: the check that should find the defect, or ``arm_file`` or ``other_arm``."""
         return self.name.partition(":")[0]

@@ -1,4 +1,4 @@
-"""The catalogue: every defect that logs and arm files are known to come with, in the order of the list of checks."""
+"""Catalogue of all known defects of logs and arm files, in the order of the list of checks."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .stretches import stretches
 
 #: All defects by name.
 DEFECTS: dict[str, Defect] = {d.name: d for d in (*conventions(), *scales(), *sampling(), *stretches())}
-#: Those that are repaired: the diagnosis goes on as if they had not been.
+#: Defects that armgap repairs, after which the diagnosis goes on as without a defect: names of the variants by kind of defect.
 REPAIRED: dict[str, tuple[str, ...]] = {
     "wraps": ("wrapped_positions:q1", "wrapped_positions:q2"),
     "held samples": ("repeated_positions:2", "repeated_positions:3", "repeated_positions:5"),
@@ -21,12 +21,12 @@ REPAIRED: dict[str, tuple[str, ...]] = {
 
 
 def chosen(words: list[str]) -> list[Defect]:
-    """Defects whose names begin with one of the words; all without any.
+    """Return the defects whose names begin with one of the words; all defects if no words are given.
 
     Raises
     ------
     ValueError
-        If no name begins with a word.
+        If no defect has a name that begins with one of the words.
     """
     for word in words:
         if not any(name.startswith(word) for name in DEFECTS):

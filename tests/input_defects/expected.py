@@ -1,4 +1,4 @@
-"""What an answer to a spoilt case has to say, and the options that remedies are written in."""
+"""What an answer to a case with a defect has to say, and the options that remedies are written in."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from typing import Any
 
-#: Numbers of remedies have to be right to this share.
+#: Largest relative error of a number in a remedy that counts as right.
 TOLERANCE = 0.1
-#: ``--zero q1=90deg`` adds 90 degrees to the column: its zero lies at 90 degrees of the model's angle.
-#: ``--factor tau1=12.5`` multiplies the column. ``--shift tau=-0.005`` adds to the stamps of the torque [s].
+#: Options with a number: ``--zero q1=90deg`` adds 90 degrees to the column, whose zero lies at 90 degrees of the model's angle;
+#: ``--factor tau1=12.5`` multiplies the column; ``--shift tau=-0.005`` adds -0.005 s to the time stamps of the torque.
 NUMBERED = ("zero", "factor", "shift")
-#: Options whose columns are each a change of their own; of the others the whole list is one change.
+#: Options of which each column counts as a change of its own; for other options the whole list of columns is one change.
 COLUMN_BY_COLUMN = ("flip", "absolute", "relative", "zero", "factor", "shift", "map", "units")
-#: Where columns are named again, two spellings.
+#: Other names of options, mapped to the names used here: two options rename columns.
 SPELLINGS = {"columns": "map"}
 
 _OPTION = re.compile(r"--([a-z]+)[ =]+([^\s|;]+)")
@@ -24,7 +24,7 @@ _NUMBER = re.compile(r"[-+]?\d*\.?\d+(?:[eE][-+]?\d+)?")
 
 @dataclass(frozen=True)
 class Option:
-    """One change: ``--zero q1=90deg`` is ``Option("zero", "q1", "", 90.0)``, ``--units q=deg`` is ``Option("units", "q", "deg")``."""
+    """One correction of columns: ``--zero q1=90deg`` is ``Option("zero", "q1", "", 90.0)``, ``--units q=deg`` is ``Option("units", "q", "deg")``."""
 
     name: str
     target: str
@@ -32,7 +32,7 @@ class Option:
     number: float | None = None
 
     def agrees(self, other: Option) -> bool:
-        """Whether both are the same change, numbers to :data:`TOLERANCE`."""
+        """Return whether both options make the same change, with numbers equal to a relative error of :data:`TOLERANCE`."""
         if (self.name, self.target, self.word) != (other.name, other.target, other.word):
             return False
         if self.number is None or other.number is None:
@@ -47,7 +47,7 @@ Remedy = tuple[Option, ...]
 
 
 def remedies(text: str, n_joints: int) -> list[Remedy]:
-    """Read the alternatives of a remedy, ``--flip tau1 | --flip q1``; each is one option or several together."""
+    """Read the alternatives of a remedy's text, such as ``--flip tau1 | --flip q1``; each is one option or several together."""
     found = [tuple(_options(part, n_joints)) for part in _OR.split(text)]
     return [remedy for remedy in found if remedy]
 
@@ -65,7 +65,7 @@ def _options(text: str, n_joints: int) -> Iterable[Option]:
 
 
 def _columns(name: str, target: str, n_joints: int) -> list[str]:
-    """A group of columns stands for each of them, except where units and times are those of the group."""
+    """Return the columns of a target: those of all joints for ``q`` or ``tau``, but the target itself for units and time shifts."""
     if target in ("q", "tau") and name not in ("units", "shift"):
         return [f"{target}{j + 1}" for j in range(n_joints)]
     return [target]
@@ -79,36 +79,36 @@ def _option(name: str, column: str, amount: str) -> Option:
 
 
 def listed(wanted: Remedy, offered: Iterable[Remedy]) -> bool:
-    """Whether a remedy is offered, as one alternative or in parts (one check per joint)."""
+    """Return whether the wanted remedy is offered, as one alternative or as the union of several (one check per joint)."""
     parts = [o for remedy in offered if within(remedy, wanted) for o in remedy]
     return all(any(w.agrees(o) for o in parts) for w in wanted)
 
 
 def within(remedy: Remedy, whole: Remedy) -> bool:
-    """Whether every option of a remedy is one of another's."""
+    """Return whether every option of `remedy` agrees with one of `whole`."""
     return all(any(w.agrees(o) for w in whole) for o in remedy)
 
 
 @dataclass(frozen=True)
 class Expected:
-    """What counts as a right answer.
+    """What counts as a right answer to a case with a defect.
 
     Attributes
     ----------
     checks : tuple of str
-        Names of checks, any of which is right; ``"*"`` for any check at all.
+        Names of checks, any of which is right; ``"*"`` for any check.
     severities : tuple of str
-        Severities that such a check may have.
+        Severities that the right check may have.
     remedies : tuple of str
-        All of these have to be offered.
+        Remedies that all have to be offered.
     also : tuple of str
-        Remedies that are right too, but not asked for.
+        Remedies that are right too, but need not be offered.
     rows : tuple of (log, first, last)
         Rows of a log (0-based) that a check has to point to, any of them; empty where rows are not asked for.
     verdicts : tuple of str
-        Verdicts that are right without any such check.
+        Verdicts that are right if none of the checks fires.
     allowed : tuple of str
-        Effects that may be named beside the defect, on any joint.
+        Effects that may be named in spite of the defect, on any joint.
     """
 
     checks: tuple[str, ...]
@@ -120,11 +120,11 @@ class Expected:
     allowed: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
-        """Return it as it is kept beside an answer."""
+        """Return the expectation as a dictionary, as a record keeps it."""
         return asdict(self)
 
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> Expected:
-        """Build it from what `to_dict` gives."""
+        """Build the expectation from a dictionary that `to_dict` returned."""
         rows = tuple((str(log), int(a), int(b)) for log, a, b in data["rows"])
         return cls(**{k: tuple(v) for k, v in data.items() if k != "rows"}, rows=rows)

@@ -1,4 +1,4 @@
-"""Claimed floors against true ones, and verdicts against what remains."""
+"""Noise floors that diagnoses report against true ones, and verdicts against the gap that remains."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ import numpy as np
 from .judging import Record
 from .tables import percent, table
 
-#: A claimed floor may be this much below or above the true one.
+#: Smallest and largest ratio of the reported to the true noise floor that counts as right.
 BAND = (0.7, 1.4)
-#: What remains is of consequence beyond so many true floors and this share of the RMS displacement over the horizon.
+#: A remaining gap matters if it exceeds this many true noise floors and this share of the RMS displacement over the horizon.
 FLOORS, SHARE = 4.0, 0.001
-#: What of the gap remains according to a verdict that calls for no effect.
+#: Stage of the gap in a diagnosis that remains under a verdict without effects: as found, or after re-estimation and selection.
 REMAINS = {"none": "before", "parameters": "after"}
 
 
 def floor_section(records: list[Record]) -> str:
-    """The section of the page."""
+    """Return the section of the page about noise floors and verdicts."""
     answered = [r for r in records if "failed" not in r and "true" in r]
     lines = [_line("all joints", answered)]
     for model in dict.fromkeys(r["model"] for r in answered):
@@ -32,7 +32,7 @@ half of the cases have white noise of 0.5 to 10 counts beside the rounding. Clai
 
 
 def ratios(records: list[Record]) -> np.ndarray:
-    """Claimed over true floor of every joint."""
+    """Return the ratio of reported to true noise floor of every joint of every record."""
     return np.array([c / t for r in records for c, t in zip(r["gap"]["floor"], r["true"]["floor"], strict=True)])
 
 
@@ -47,7 +47,7 @@ def _inside(ratio: np.ndarray) -> str:
 
 
 def contradicts(record: Record) -> list[str]:
-    """Joints on which more remains than the verdict says."""
+    """Return a line for each joint whose remaining gap is too large for the record's verdict; empty if there are none."""
     if record["verdict"] not in REMAINS:
         return []
     left, true = record["gap"][REMAINS[record["verdict"]]], record["true"]

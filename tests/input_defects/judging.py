@@ -1,4 +1,4 @@
-"""One record against what was expected of it."""
+"""Judgement of one record against what was expected of its answer."""
 
 from __future__ import annotations
 
@@ -10,29 +10,29 @@ from armgap.trial.verdict import equivalent
 from .expected import Expected, Remedy, listed, remedies, within
 
 Record = dict[str, Any]
-#: A cause with this probability or more is one that the user acts on.
+#: Probability from which a cause counts as named, because a user would act on it.
 NAMED = 0.5
-#: Rows may be off by this many.
+#: Largest difference of row numbers at which a check still points to the right rows.
 ROWS = 2
 
 
 @dataclass(frozen=True)
 class Judged:
-    """What came of one spoilt case.
+    """Judgement of the answer to one case with a defect.
 
     Attributes
     ----------
     right : bool
-        A check of the expected names with an expected severity (and rows, where they are asked for), and none of another
-        name that stops or repairs.
+        Whether a check with an expected name and severity (and rows, where these are asked for) fired, or an accepted verdict came without
+        any such check; and no check of another name stopped the diagnosis or repaired the input.
     complete : bool
-        Right, and all expected remedies offered.
+        Whether the answer is right and offers all expected remedies.
     others : tuple of str
-        Checks of other names that stop or repair.
+        Names of other checks that stopped the diagnosis or repaired the input.
     strange : bool
-        A remedy is offered that is none.
+        Whether the checks offer a remedy that is not among the right ones.
     wrong : tuple of str
-        Effects named beside the defect that are not there.
+        Effects that are named in spite of the defect and are not in the arm.
     """
 
     right: bool
@@ -43,7 +43,7 @@ class Judged:
 
 
 def judged(record: Record) -> Judged:
-    """Judge a record that has an expectation."""
+    """Return the judgement of a record that states what was expected."""
     expected = Expected.from_dict(record["expected"])
     found = checks(record)
     fit = [c for c in found if _fits(c, expected)]
@@ -63,7 +63,7 @@ def judged(record: Record) -> Judged:
 
 
 def checks(record: Record) -> list[Record]:
-    """Checks that fired, among them what was refused or converted because of a unit while a log was read."""
+    """Return the checks that fired, together with refusals and unit conversions from the reading of the log, in the form of checks."""
     found = list(record.get("checks", []))
     refused = record.get("refused", {})
     if refused:
@@ -96,7 +96,7 @@ def _overlap(check: Record, log: str, first: int, last: int) -> bool:
 
 
 def _stops(record: Record, fit: list[Record]) -> bool:
-    """Whether an error stops the diagnosis, as it has to."""
+    """Return whether the diagnosis gave no result if one of the right checks is an error; true if none of these is."""
     return record["verdict"] in ("input", "refused") or all(c["severity"] != "error" for c in fit)
 
 
@@ -105,7 +105,7 @@ def _among(remedy: Remedy, known: list[Remedy]) -> bool:
 
 
 def wrong_effects(record: Record, allowed: tuple[str, ...] = ()) -> tuple[str, ...]:
-    """Effects named with :data:`NAMED` or more that are neither hidden, nor alike, nor say that they may be the hidden one."""
+    """Return the effects named with probability :data:`NAMED` or more of which neither name nor equivalents match a hidden effect."""
     hidden = [(str(effect), joint) for effect, joint in record["hidden"]]
 
     def true(cause: Record) -> bool:
@@ -117,7 +117,7 @@ def wrong_effects(record: Record, allowed: tuple[str, ...] = ()) -> tuple[str, .
 
 
 def first_right(record: Record) -> bool:
-    """Whether the first cause is a hidden one, or its equivalent; without hidden effects, whether none is named."""
+    """Return whether the first cause is a hidden effect or its equivalent; without hidden effects, whether no cause is named."""
     hidden = [(str(effect), joint) for effect, joint in record["hidden"]]
     causes = record.get("causes", []) if record.get("verdict") == "effect" else []
     if not hidden or not causes:

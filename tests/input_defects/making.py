@@ -18,25 +18,25 @@ from armgap.trial.trial import Plan, plan_trial
 from .case import Array, Inputs, Table, Truth
 
 TRUE_MOTION = "true-motion.npz"
-#: Stands in the folder of a case for which no motion was found.
+#: Name of the marker file in the folder of a case for which the generator found no motion.
 NONE = "no-motion"
 FIELDS = ("t", "q", "tau", "q_true", "dq_true")
 
 
 @dataclass(frozen=True)
 class Kept:
-    """A case as it was made.
+    """A case as the generator made it, without a defect.
 
     Attributes
     ----------
     name : str
-        Of its folder.
+        Name of the case's folder.
     inputs : Inputs
-        Without any defect.
+        Logs and arm file without a defect.
     truth : Truth
-        The true arm.
+        True arm.
     key : Key
-        The hidden effects.
+        Key of the case with the hidden effects.
     """
 
     name: str
@@ -46,19 +46,19 @@ class Kept:
 
     @property
     def hidden(self) -> tuple[tuple[str, int | None], ...]:
-        """Distinct hidden effects and their joints."""
+        """Distinct hidden effects, each with its joint (from 1; None for the whole arm)."""
         return tuple(dict.fromkeys((h.effect, h.joint) for h in self.key.effects))
 
 
 def plans(seed: int, count: int, models: Sequence[str], share: float, duration: float) -> dict[str, Plan]:
-    """Cases of all models by turns; a share of them hides one effect of the library.
+    """Return the plans of cases, by name, that take the arm models in turn; a share of the cases hides one effect of the library.
 
     Parameters
     ----------
     seed, count : int
-        Everything random follows from the seed; the first cases of a longer list are those of a shorter one.
+        Seed of everything random, and number of cases; the first cases of a longer list are those of a shorter one.
     models : sequence of str
-        Machines.
+        Names of the trial's arm models.
     share : float
         Share of cases with a hidden effect, 0 to 1.
     duration : float
@@ -82,13 +82,13 @@ def _plan(seed: int, number: int, model: str, share: float, duration: float) -> 
 
 
 def trial_plans(seed: int, count: int, duration: float) -> dict[str, Plan]:
-    """The cases of a blind trial; their names say the seed and the size of the trial, as both decide on each."""
+    """Return the plans of a blind trial's cases; the names contain seed and size of the trial, because both determine each case."""
     drawn = plan_trial(seed, count)
     return {f"trial-{seed}-{count}-{i:04d}-{duration:g}s": replace(p, duration=duration) for i, p in enumerate(drawn)}
 
 
 def make(plan: Plan, folder: Path) -> bool:
-    """Make a case that is not there yet; False where the generator found no motion."""
+    """Make a case unless its folder exists; return False where the generator found no motion."""
     if (folder / NONE).exists():
         return False
     if folder.exists():
@@ -103,7 +103,7 @@ def make(plan: Plan, folder: Path) -> bool:
 
 
 def keep(case: Case, folder: Path) -> None:
-    """Write a case and its true motion; the folder appears when it is whole."""
+    """Write a case and its true motion; the folder gets its name only when it is complete."""
     partial = folder.with_name(f".{folder.name}.partial")
     shutil.rmtree(partial, ignore_errors=True)
     case.write(partial)
@@ -113,7 +113,7 @@ def keep(case: Case, folder: Path) -> None:
 
 
 def read(folder: Path) -> Kept:
-    """Read a case that `make` has made."""
+    """Read a case that `make` has made from its folder."""
     arm = tomllib.loads((folder / "arm.toml").read_text(encoding="utf-8"))
     key = open_key(folder)
     del arm["sealed"]

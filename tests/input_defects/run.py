@@ -1,4 +1,4 @@
-"""The command that makes cases, spoils them, and records the answers: ``python -m tests.input_defects.run --help``."""
+"""Command that makes cases, puts defects into them, and records the answers: ``python -m tests.input_defects.run --help``."""
 
 from __future__ import annotations
 
@@ -24,22 +24,22 @@ from .defects import REPAIRED, chosen
 from .making import make, plans, read, trial_plans
 
 MODES = ("defects", "clean", "repaired", "floor")
-#: Longest time for one answer, and for making one case [s].
+#: Time limits for one answer, and for making one case [s].
 LIMIT, MAKING = 600.0, 1200.0
-#: Libraries read these when they are loaded: one thread in each process.
+#: Environment variables that limit the threads of libraries when these are loaded: one thread in each process.
 THREADS = ("RAYON_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "POLARS_MAX_THREADS")
 
 
 @dataclass(frozen=True)
 class Task:
-    """One case to be diagnosed with one defect."""
+    """One case to be diagnosed with one defect (`WHOLE` for none)."""
 
     case: str
     defect: str
 
 
 def main(words: list[str] | None = None) -> None:
-    """Read the options, make what is missing, ask what was not asked."""
+    """Read the options, make the missing cases, and record the answers to questions that have none yet."""
     options = _options().parse_args(words)
     models = options.models.split(",") if options.models else list(MODELS)
     unknown = [m for m in models if m not in MODELS]
@@ -96,7 +96,7 @@ def _plans(options: argparse.Namespace, models: list[str]) -> dict[str, Plan]:
 
 
 def _made(cases: dict[str, Plan], cache: Path, jobs: int) -> list[str]:
-    """Names of the cases that are there, after those that were missing have been made."""
+    """Make the missing cases; return the names of all cases for which the generator found a motion."""
     with worker_pool(jobs) as pool:
         futures = {name: pool.schedule(make, args=[p, cache / name], timeout=MAKING) for name, p in cases.items()}
         return [name for name, future in futures.items() if future.result()]
@@ -110,13 +110,13 @@ def _tasks(options: argparse.Namespace, cases: list[str], names: list[str]) -> I
             yield from (Task(case, name) for name in names)
         elif options.mode == "repaired":
             rng = np.random.default_rng([options.seed, int(case.split("-")[3])])
-            # All kinds are drawn, so that a run of some asks what a run of all would.
+            # One variant of each kind is drawn even if few are asked for, so that the draws do not depend on the selection.
             drawn = [str(rng.choice(variants)) for variants in REPAIRED.values()]
             yield from (Task(case, name) for name in drawn if name in names)
 
 
 def _done(options: argparse.Namespace) -> set[Task]:
-    """Tasks whose answers by this build stand in the output, of this mode and seed; what failed is asked again."""
+    """Return the tasks that this build has answered in the output file with the same mode and seed; failed ones are not among them."""
     if not options.output.exists():
         return set()
     records = [json.loads(line) for line in options.output.read_text(encoding="utf-8").splitlines()]
@@ -139,7 +139,7 @@ def _answers(
 
 
 def _result(task: Task, future: Any, limit: float) -> Record:
-    """The record, or why there is none."""
+    """Return the record of a finished task, or a record of the error or the exceeded time limit [s]."""
     from pebble import ProcessExpired
 
     failed: Record = {"case": task.case, "defect": task.defect}
@@ -149,7 +149,7 @@ def _result(task: Task, future: Any, limit: float) -> Record:
         return {**failed, "failed": f"took longer than {limit:g} s"}
     except ProcessExpired as end:
         return {**failed, "failed": f"its process ended with status {end.exitcode}"}
-    except Exception as error:  # whatever breaks one answer must not end the run; it is counted as failed
+    except Exception as error:  # an error in one answer must not end the run; the task is counted as failed
         return {**failed, "failed": f"{type(error).__name__}: {error}"}
     return record
 

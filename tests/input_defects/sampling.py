@@ -1,4 +1,4 @@
-"""Defects of time and resolution: shifted, held, filtered, rounded, wrapped, and stamps that scatter."""
+"""Defects of time and resolution: shifted, held, filtered, rounded and wrapped samples, and irregular time stamps."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from .expected import Expected
 
 Result = tuple[Inputs, Expected]
 
-#: Cut-off of the filters [Hz], and the rate of a bus that is slower than the log [Hz].
+#: Cut-off of the low-pass filters, and sample rate of a field bus that is slower than the log [Hz].
 CUT_OFF, BUS = 8.0, 42.0
-#: Step of a coarse torque [N m], and its share of the column's range where that is used.
+#: Step to which torques are rounded [N m], and the step as a share of the column's range where the range decides.
 TORQUE_STEP, SHARE = 0.5, 0.04
-#: How often such a defect is in all logs, in those learnt from only, in those judged on only.
+#: Probability that a defect is in all logs, in the training logs only, in the holdout only.
 WHERE = {"both": 0.5, "training": 0.25, "holdout": 0.25}
 #: Effects that act in the time of a shift, and those whose motion is faster than a filter or a held sample lets through.
 SHIFTS = ("actuator_delay", "actuator_lag")
@@ -27,7 +27,7 @@ FAST = (*SHIFTS, "joint_elasticity", "backlash", "external_pulse", "presliding",
 
 
 def sampling() -> Iterator[Defect]:
-    """All of them."""
+    """Yield the defects of time and resolution."""
     for rows in range(1, 6):
         yield Defect(f"time_shift:late {rows}", partial(late, rows=rows), ANY, ("q", "rows"), SHIFTS)
         yield Defect(f"time_shift:early {rows}", partial(early, rows=rows), ANY, ("tau", "rows"), SHIFTS)
@@ -46,7 +46,7 @@ def sampling() -> Iterator[Defect]:
 
 
 def late(inputs: Inputs, truth: Truth, _: np.random.Generator, *, rows: int) -> Result:
-    """The torque of ``rows`` samples ago in every row: the arm moves before it is driven."""
+    """Put the torque of `rows` samples earlier into every row, so that the arm appears to move before it is driven."""
 
     def change(x: Table) -> Table:
         return x.rows(slice(rows, None)).changed(tau=x.tau[:-rows])
@@ -56,9 +56,9 @@ def late(inputs: Inputs, truth: Truth, _: np.random.Generator, *, rows: int) -> 
 
 
 def early(inputs: Inputs, truth: Truth, _: np.random.Generator, *, rows: int) -> Result:
-    """The torque of ``rows`` samples later in every row: like a delay on every joint.
+    """Put the torque of `rows` samples later into every row, which looks like a delay on every joint.
 
-    Up to one sample is a nuisance, which need not be said.
+    A shift of up to one sample is a nuisance, which need not be reported.
     """
 
     def change(x: Table) -> Table:
@@ -71,7 +71,7 @@ def early(inputs: Inputs, truth: Truth, _: np.random.Generator, *, rows: int) ->
 
 
 def held(inputs: Inputs, truth: Truth, rng: np.random.Generator, *, rows: int) -> Result:
-    """Positions that come once in so many rows and are held."""
+    """Update positions only once in so many rows, and hold them in between."""
 
     def change(x: Table) -> Table:
         return x.changed(q=x.q[rows * (np.arange(len(x.t)) // rows)])
@@ -82,31 +82,31 @@ def held(inputs: Inputs, truth: Truth, rng: np.random.Generator, *, rows: int) -
 def filtered(
     inputs: Inputs, truth: Truth, rng: np.random.Generator, *, change: Callable[[Array, Array], Array]
 ) -> Result:
-    """Positions smoother than their encoder."""
+    """Filter positions by `change`, so that they are smoother than the encoder's steps allow."""
     expected = Expected(("filtered_positions",), ("warning", "error"))
     return inputs.each(lambda x: x.changed(q=change(x.t, x.q)), _where(rng)), expected
 
 
 def causal(t: Array, q: Array) -> Array:
-    """First-order low-pass at :data:`CUT_OFF`, from rest at the first sample."""
+    """Return positions after a first-order low-pass with cut-off :data:`CUT_OFF`, at rest at the first sample."""
     b, a = signal.butter(1, CUT_OFF, fs=_rate(t))
     return np.asarray(signal.lfilter(b, a, q, axis=0, zi=signal.lfilter_zi(b, a)[:, None] * q[:1])[0])
 
 
 def zero_phase(t: Array, q: Array) -> Array:
-    """Second-order low-pass at :data:`CUT_OFF`, forward and backward."""
+    """Return positions after a second-order low-pass with cut-off :data:`CUT_OFF`, applied forward and backward."""
     return np.asarray(signal.filtfilt(*signal.butter(2, CUT_OFF, fs=_rate(t)), q, axis=0))
 
 
 def interpolated(t: Array, q: Array) -> Array:
-    """Read at :data:`BUS`, with straight lines between."""
+    """Return positions sampled at the rate :data:`BUS` and interpolated linearly."""
     coarse = np.arange(t[0], t[-1] + 1 / BUS, 1 / BUS)
     read = np.searchsorted(t, coarse + 1e-9, side="right").clip(1, len(t)) - 1
     return np.column_stack([np.interp(t, t[read], column[read]) for column in q.T])
 
 
 def rounded(inputs: Inputs, truth: Truth, rng: np.random.Generator, *, step: float | None = None) -> Result:
-    """Torques in steps: of `step`, or of a share of each column's range. The arm felt the torque without them."""
+    """Round logged torques to multiples of `step` [N m], or of a share of each column's range; the arm received the unrounded torques."""
     span = np.max([np.ptp(x.tau, axis=0) for x in inputs.logs.values()], axis=0)
     steps = SHARE * span if step is None else np.full(truth.n_joints, step)
     changed = inputs.each(lambda x: x.changed(tau=np.round(x.tau / steps) * steps), _where(rng))
@@ -114,7 +114,7 @@ def rounded(inputs: Inputs, truth: Truth, rng: np.random.Generator, *, step: flo
 
 
 def wrapped(inputs: Inputs, truth: Truth, rng: np.random.Generator, *, joint: int) -> Result:
-    """A turn's wrap amid the joint's travel: an absolute encoder whose zero lies there."""
+    """Wrap a joint's positions by a whole turn in the middle of its travel, as an absolute encoder with its zero there does."""
     name, turn = f"q{joint}", 2 * math.pi
     where = _where(rng)
     logs = inputs.holdout if where == "holdout" else inputs.training
@@ -124,7 +124,7 @@ def wrapped(inputs: Inputs, truth: Truth, rng: np.random.Generator, *, joint: in
 
 
 def scattered(inputs: Inputs, truth: Truth, rng: np.random.Generator, *, share: float) -> Result:
-    """Stamps that scatter by a share of the period (one standard deviation) around even samples, in increasing order."""
+    """Add noise to the time stamps, with a standard deviation of a share of the period; the stamps still increase."""
 
     def change(x: Table) -> Table:
         t = np.sort(x.t + share * truth.period * rng.standard_normal(len(x.t)))

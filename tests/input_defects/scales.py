@@ -15,18 +15,18 @@ from .expected import Expected
 
 Result = tuple[Inputs, Expected]
 
-#: Torque constant of a small motor [N m/A], and a harmonic drive's ratio.
+#: Torque constant of a small motor [N m/A], and gear ratio of a harmonic drive.
 CURRENT, GEAR = 0.08, 50.0
-#: A factor within these is a gain of the drive rather than another unit, with a margin on both sides.
+#: Range of factors on one torque that may be a gain of the drive instead of another unit, with a margin on both sides.
 GAINS = (0.4, 2.5)
-#: One factor on all torques within these may be an arm file that is as far off, which no log tells apart.
+#: Range of one factor on all torques that may as well be an error of the whole arm file, which no log can distinguish.
 SCALED = (0.2, 5.0)
-#: Time by which a servo's joint follows its commanded position [s].
+#: Smallest and largest time constant with which a servo's joint follows its commanded position [s].
 FOLLOWS = (0.02, 0.08)
 
 
 def scales() -> Iterator[Defect]:
-    """All of them."""
+    """Yield the defects of unit and meaning."""
     gain, tau = ("torque_gain",), ("tau",)
     for name, factor in (("current", CURRENT), ("gear 50", GEAR)):
         yield Defect(f"torque_unit:{name}", partial(scaled, factor=factor), ANY, tau, gain)
@@ -41,13 +41,13 @@ def scales() -> Iterator[Defect]:
 
 
 def scaled(inputs: Inputs, truth: Truth, _: np.random.Generator, *, factor: float, only: int = 0) -> Result:
-    """Torques that have to be multiplied by one factor, in every column or in one."""
+    """Divide torques by `factor`, in every column or in that of joint `only`, so that a multiplication restores them."""
     factors = np.array([factor if only in (0, j + 1) else 1.0 for j in range(truth.n_joints)])
     return _divided(inputs, factors)
 
 
 def percentage(inputs: Inputs, truth: Truth, _: np.random.Generator) -> Result:
-    """Torques in percent of the limit."""
+    """Log torques in percent of the torque limit."""
     factors = truth.limit / 100
     if np.any((factors > GAINS[0]) & (factors < GAINS[1])):
         raise NotApplicableError("a percentage of this limit is about a newton metre")
@@ -64,7 +64,7 @@ def _divided(inputs: Inputs, factors: Array) -> Result:
 
 
 def commanded(inputs: Inputs, truth: Truth, rng: np.random.Generator, *, only: int = 0, unit: float = 1.0) -> Result:
-    """A servo's commanded position in the torque's column: the joint follows it as a first-order lag does."""
+    """Put a servo's commanded position, which the joint follows as a first-order lag, into the torque's column."""
     lag = rng.uniform(*FOLLOWS)
     joints = [j for j in range(truth.n_joints) if only in (0, j + 1)]
 
@@ -78,7 +78,7 @@ def commanded(inputs: Inputs, truth: Truth, rng: np.random.Generator, *, only: i
 
 
 def counted_in(inputs: Inputs, truth: Truth, _: np.random.Generator, *, unit: str, per_si: float) -> Result:
-    """Positions in another unit. Degrees and millimetres may be refused or converted when a log is read."""
+    """Log positions in another unit; degrees and millimetres may be refused or converted when the log is read."""
     severities = ("error",) if unit == "turns" else ("error", "repaired")
     expected = Expected(("position_unit",), severities, (f"--units q={unit}",))
     return inputs.each(lambda x: x.changed(q=x.q * per_si)), expected

@@ -1,4 +1,4 @@
-"""The command that turns recorded answers into a page: ``python -m tests.input_defects.score FILE… [-o PAGE.md]``."""
+"""Command that writes a page from recorded answers: ``python -m tests.input_defects.score FILE… [-o PAGE.md]``."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ arm does not have the defect, or the hidden effect is of its kind."""
 
 
 def main(words: list[str] | None = None) -> None:
-    """Read the records, write the page."""
+    """Read the records of answers and write the page."""
     parser = argparse.ArgumentParser(prog="python -m tests.input_defects.score", description=__doc__)
     parser.add_argument("records", nargs="+", type=Path, metavar="JSONL")
     parser.add_argument("-o", "--output", type=Path, metavar="MD", help="the page; on standard output by default")
@@ -46,14 +46,14 @@ def main(words: list[str] | None = None) -> None:
 
 
 def load(paths: Iterable[Path]) -> list[Record]:
-    """All records; of several of the same question the last."""
+    """Return all records of the files; of several answers to one question the last."""
     lines = [line for path in paths for line in path.read_text(encoding="utf-8").splitlines()]
     records = [json.loads(line) for line in lines]
     return list({(r["mode"], r["seed"], r["case"], r["defect"]): r for r in records}.values())
 
 
 def expected_now(records: list[Record], cache: Path) -> list[Record]:
-    """Records with what the catalogue expects now, where that has changed since they were made."""
+    """Return the records with what the catalogue expects now in place of what it expected when they were made."""
     return [
         {**r, "expected": spoilt(read(cache / r["case"]), r["defect"], r["seed"])[1].to_dict()}
         if "expected" in r
@@ -63,7 +63,7 @@ def expected_now(records: list[Record], cache: Path) -> list[Record]:
 
 
 def page(records: list[Record]) -> str:
-    """The page with a section for every mode that was run."""
+    """Return the page as Markdown, with a section for every mode that was run."""
     parts = [INTRODUCTION, _made(records)]
     for mode, section in SECTIONS.items():
         of_mode = [r for r in records if r["mode"] in READ_FROM.get(mode, (mode,))]
@@ -74,7 +74,7 @@ def page(records: list[Record]) -> str:
 
 
 def schema_section(records: list[Record]) -> str:
-    """How many of the diagnoses fit their schema and read and written are the same."""
+    """Return the section on how many diagnoses fit their JSON Schema and are unchanged when read and written again."""
     asked = [r for r in records if "schema" in r]
     wrong = [[r["case"], r["defect"], "; ".join(r["schema"])] for r in asked if r["schema"]]
     text = f"{len(asked) - len(wrong)} of {len(asked)} diagnoses are as the JSON schema says, and the same text after reading and writing."
@@ -90,14 +90,14 @@ def _made(records: list[Record]) -> str:
 
 @dataclass(frozen=True)
 class Row:
-    """One spoilt case and what came of it; no judgement where there is no answer."""
+    """Record of one case with a defect, and its judgement, or None where there is no answer."""
 
     record: Record
     judged: Judged | None
 
 
 def defects_section(records: list[Record]) -> str:
-    """Which defects are named, with which remedies, and what is wrongly named beside them."""
+    """Return the section on which defects are found, with which remedies, and what is wrongly named in spite of them."""
     rows = [Row(r, None if "failed" in r else judged(r)) for r in records if "skipped" not in r]
     left_out = Counter(r["defect"] for r in records if "skipped" in r)
     head = ["defect", "cases", "right", "all remedies", "no wrong effect", "other remedies", "left out"]
@@ -133,7 +133,7 @@ def _line(name: str, rows: Sequence[Row], left_out: int) -> list[str]:
 
 
 def _wrong(rows: list[Row]) -> str:
-    """Every answer that is not right in full."""
+    """Return a list of every answer that is not right or not complete."""
     lines = []
     for x in rows:
         if x.judged is None or (x.judged.complete and not x.judged.wrong):
@@ -161,7 +161,7 @@ def _failed(records: list[Record]) -> str:
 
 
 def clean_section(records: list[Record]) -> str:
-    """What fires where nothing is wrong."""
+    """Return the section on checks that fire on cases without a defect."""
     answered = [r for r in records if "failed" not in r]
     fired = [(c["severity"], c["check"], r) for r in answered for c in checks(r)]
     totals = {
@@ -182,7 +182,7 @@ def clean_section(records: list[Record]) -> str:
 
 
 def repaired_section(records: list[Record]) -> str:
-    """Whether the diagnosis is as good after a repair as it is without the defect."""
+    """Return the section that compares diagnoses of repaired inputs with diagnoses of the same cases without the defect."""
     whole = {(r["seed"], r["case"]): r for r in records if r["defect"] == WHOLE}
     lines = []
     for name, variants in REPAIRED.items():
@@ -201,7 +201,7 @@ def repaired_section(records: list[Record]) -> str:
 
 
 def destroyed(record: Record) -> bool:
-    """Whether held samples leave nothing of a hidden effect: it is over within the time for which they are held."""
+    """Return whether held samples hide a hidden effect completely, because it is shorter than the time for which a sample is held."""
     if not record["defect"].startswith("repeated_positions:"):
         return False
     time = int(record["defect"].partition(":")[2]) * record["period"]
@@ -209,7 +209,7 @@ def destroyed(record: Record) -> bool:
 
 
 def _lasts(effect: str, parameters: dict[str, float]) -> float:
-    """Time in which an effect shows itself [s]; a quarter of the period of a spring, infinite for what is slow."""
+    """Return the time scale of an effect [s]: of an elastic joint a quarter of its period, infinite for an effect without a time scale."""
     if effect == "joint_elasticity":
         return 0.25 * 6.283 * float((parameters["rotor_inertia"] / parameters["stiffness"]) ** 0.5)
     times = {"actuator_delay": "delay", "actuator_lag": "time_constant", "external_pulse": "duration"}
@@ -223,7 +223,7 @@ SECTIONS: dict[str, Callable[[list[Record]], str]] = {
     "floor": floor_section,
 }
 
-#: Cases for the floor have no defect either, so what fires on them counts as well.
+#: Modes whose records a section uses: the cases of mode ``floor`` have no defect either, so that checks that fire on them count too.
 READ_FROM = {"clean": ("clean", "floor")}
 
 

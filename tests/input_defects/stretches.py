@@ -14,17 +14,17 @@ from .expected import Expected
 
 Result = tuple[Inputs, Expected]
 
-#: Length of a stretch without torque [s].
+#: Length of a stretch with zero or constant torque [s].
 DEAD = 2.0
 ANY_SEVERITY = ("error", "repaired", "warning")
-#: Exponent bits of a double, from the lowest: flipping one makes a value 2 to 2^16 times larger or smaller.
+#: Lowest exponent bits of a double, counted from bit 0 of the number: a flipped one changes a value by a factor of 2 to 2^16.
 BITS = range(52, 57)
 #: Verdicts that name no wrong effect.
 HARMLESS = ("none", "parameters", "effect")
 
 
 def stretches() -> Iterator[Defect]:
-    """All of them."""
+    """Yield the defects of rows, stretches, whole files and arm files."""
     for name, change, group in (("q = 25", outside, "q"), ("flipped bit", bit_flip, "q"), ("tau = 1e6", huge, "tau")):
         yield Defect(f"spike:{name}", partial(spike, change=change), ANY, (group,))
     for name in ("start", "middle", "constant"):
@@ -46,7 +46,7 @@ def spike(
     *,
     change: Callable[[Table, int, np.random.Generator], Table],
 ) -> Result:
-    """One row of one log that no motion explains."""
+    """Change one row of one log, in the middle of a motion, to a value that no motion explains."""
     name = str(rng.choice(list(inputs.logs)))
     table = inputs.logs[name]
     q = np.abs(table.q[:, 0])
@@ -57,17 +57,17 @@ def spike(
 
 
 def outside(x: Table, row: int, _: np.random.Generator) -> Table:
-    """25 rad (m)."""
+    """Set the position of joint 1 in one row to 25 rad (or 25 m)."""
     return x.with_column("q1", _put(x.column("q1"), row, 25.0))
 
 
 def huge(x: Table, row: int, _: np.random.Generator) -> Table:
-    """A million newton metres."""
+    """Set the torque of joint 1 in one row to 1e6 N m (or N)."""
     return x.with_column("tau1", _put(x.column("tau1"), row, 1e6))
 
 
 def bit_flip(x: Table, row: int, rng: np.random.Generator) -> Table:
-    """One bit of the exponent."""
+    """Flip one exponent bit of joint 1's position in one row."""
     bits = x.column("q1")[row : row + 1].copy().view(np.uint64) ^ np.uint64(1 << int(rng.choice(BITS)))
     return x.with_column("q1", _put(x.column("q1"), row, float(bits.view(np.float64)[0])))
 
@@ -79,7 +79,7 @@ def _put(column: Array, row: int, value: float) -> Array:
 
 
 def dead(inputs: Inputs, truth: Truth, rng: np.random.Generator, *, name: str) -> Result:
-    """All torques zero for a while in one log, or held: at its start, or where they are largest."""
+    """Set all torques of one log to zero, or to a constant, for :data:`DEAD` seconds, at the start or where they are largest."""
     log = str(rng.choice(list(inputs.logs)))
     tau, rows = inputs.logs[log].tau, round(DEAD / truth.period)
     power = np.concatenate([[0.0], np.cumsum(np.mean((tau / np.std(tau, axis=0)) ** 2, axis=1))])
@@ -94,7 +94,7 @@ def dead(inputs: Inputs, truth: Truth, rng: np.random.Generator, *, name: str) -
 
 
 def copied(inputs: Inputs, truth: Truth, _: np.random.Generator, *, first: float, last: float) -> Result:
-    """A holdout that is the training log, or a part of it, under another name and with times from zero."""
+    """Replace the holdout by the training log, or a part of it, under another name and with times from zero."""
     table = next(iter(inputs.training.values()))
     n = len(table.t)
     part = table.rows(slice(round(first * n), round(last * n)))
@@ -105,7 +105,7 @@ def copied(inputs: Inputs, truth: Truth, _: np.random.Generator, *, first: float
 def wrong_values(
     inputs: Inputs, truth: Truth, _: np.random.Generator, *, factor: float, friction: bool = True
 ) -> Result:
-    """Values far from the true ones, with the trust of good ones. All of them alike are one factor on all torques."""
+    """Multiply values and standard deviations of the arm file by `factor`: the inertial ones, or all, which equals a factor on all torques."""
     changed = inputs.with_arm("inertial", **_times(inputs, "inertial", ("theta", "sigma"), factor))
     if not friction:
         return changed, Expected((), (), verdicts=("parameters", "effect"))
@@ -121,7 +121,7 @@ def _times(inputs: Inputs, table: str, names: tuple[str, ...], factor: float) ->
 
 
 def wide_sigma(inputs: Inputs, truth: Truth, _: np.random.Generator) -> Result:
-    """Right values that are not trusted at all."""
+    """Set all standard deviations of the arm file to 1e12, with correct values."""
     n = len(truth.inertial)
     changed = inputs.with_arm("inertial", sigma=[1e12] * n)
     wide = [1e12] * truth.n_joints
@@ -130,12 +130,12 @@ def wide_sigma(inputs: Inputs, truth: Truth, _: np.random.Generator) -> Result:
 
 
 def backwards(inputs: Inputs, truth: Truth, _: np.random.Generator) -> Result:
-    """Torques from the end to the beginning: columns of another motion."""
+    """Reverse the torques in time, so that they belong to another motion than the positions."""
     return inputs.each(lambda x: x.changed(tau=x.tau[::-1].copy())), Expected(("*",), ("error",))
 
 
 def two_of_six(inputs: Inputs, truth: Truth, rng: np.random.Generator) -> Result:
-    """Joints 2 and 5 of a six-joint arm, whose other joints move and load them, in the columns of a two-link arm."""
+    """Replace positions and torques by joints 2 and 5 of a six-joint arm, whose other joints move and load these two."""
     weights = rng.uniform(0.3, 1.5, (6, 6)) * rng.choice([-1.0, 1.0], (6, 6))
     weights[np.diag_indices(6)] = rng.uniform(1.0, 2.0, 6)
     load, friction = rng.uniform(5.0, 40.0, 2), rng.uniform(0.5, 4.0, 2)

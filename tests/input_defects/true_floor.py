@@ -1,11 +1,11 @@
-"""The floor that a case has: by how much a perfect model's predictions miss, from the true motion and the known noise.
+"""True noise floor of a case: the prediction error of a perfect model, from the true motion and the known noise.
 
 A gap is the RMS of measured minus predicted positions over windows of the holdout, each predicted from its measured start
-(docs/notation.md). For a perfect model there remain the noise of every sample and the error of the start, carried along the window. Both
-are known here: the encoder's rounding and any noise that was added, and the true state where a window starts. So the true arm, with its
-hidden effects, is run in MuJoCo once more; at every window's start its true state is displaced by the error that the measured start has,
-and it runs on under the logged torque. What that run and the measurement differ by is the floor, without any model, derivative or estimate
-of noise. Where the windows begin, and from which measured states, the diagnosis says.
+(docs/notation.md). For a perfect model, the noise of every sample and the error of the measured start remain; the latter propagates along the
+window. Both are known here: the encoder's rounding, any added noise, and the true state at the start of a window. The true arm, with its
+hidden effects, is simulated in MuJoCo again; at the start of every window its state is displaced by the error of the measured start, and it
+is simulated from there under the logged torque. The RMS difference from the measured positions is the floor, without any model, derivative
+or estimate of noise. The starts of the windows and their measured states are taken from the diagnosis.
 """
 
 from __future__ import annotations
@@ -28,19 +28,19 @@ from armgap.trial.simulation.simulated_arm import SimulatedArm
 from .case import Array
 from .making import Kept
 
-#: The true motion is run again to this [rad or m].
+#: Largest difference between the repeated simulation and the recorded true positions [rad or m].
 SAME = 1e-9
 
 
 class Starts(NamedTuple):
-    """Where the windows of one log start.
+    """Starts of the windows of one holdout log.
 
     Attributes
     ----------
     t : sequence of float
         Times of the first predicted samples [s since the log's start].
     q, dq : ndarray, shape (n_windows, n_joints)
-        Measured states one sample before, from which the windows are predicted [rad or m, and per second].
+        Measured states at the sample before, from which the windows are predicted [rad or m, and per second].
     """
 
     t: Sequence[float]
@@ -49,14 +49,14 @@ class Starts(NamedTuple):
 
 
 def true_floor(case: Kept, starts: Mapping[str, Starts]) -> dict[str, list[float]]:
-    """Return ``floor``, RMS per joint, and ``travel``: RMS displacement over a window.
+    """Return ``floor``, the true noise floor per joint, and ``travel``, the RMS displacement over a window per joint [rad or m].
 
     Parameters
     ----------
     case : Kept
-        A case as it was diagnosed.
+        Case as it was diagnosed.
     starts : mapping of str to Starts
-        Of every holdout log, as the diagnosis cut it.
+        Starts of the windows of every holdout log, as the diagnosis chose them.
     """
     squares, travels = [], []
     for name, table in case.inputs.holdout.items():
@@ -70,7 +70,7 @@ def true_floor(case: Kept, starts: Mapping[str, Starts]) -> dict[str, list[float
 
 
 def measured_again(case: Kept, noise: Array, rng: np.random.Generator) -> Kept:
-    """The same motion measured with white noise before rounding; without noise, as it was."""
+    """Return the case with positions measured again, with white noise [rad or m] before rounding; unchanged if the noise is zero."""
     if not np.any(noise):
         return case
     inputs = case.inputs
@@ -87,23 +87,23 @@ def _encoders(case: Kept, log: str) -> list[Encoder]:
 
 
 def shown_by(encoders: list[Encoder], q: Array) -> Array:
-    """True positions (..., n_joints) as encoders with hidden faults show them, before rounding."""
+    """Return true positions (..., n_joints) as encoders with hidden errors show them, before rounding."""
     return np.stack([x + e.a * np.sin(x) + e.b * np.cos(x) + e.offset for e, x in zip(encoders, q.T, strict=True)], -1)
 
 
 def rate_shown_by(encoders: list[Encoder], q: Array, dq: Array) -> Array:
-    """True velocities (n_joints,) as the same encoders show them."""
+    """Return true velocities (n_joints,) as encoders with hidden errors show them at positions `q`."""
     slopes = [1 + e.a * np.cos(x) - e.b * np.sin(x) for e, x in zip(encoders, q, strict=True)]
     return np.asarray(dq * np.array(slopes))
 
 
 def arm_of(case: Kept) -> TrialArm:
-    """The true arm: the first that the generator draws from the case's seed."""
+    """Return the true arm: the first that the generator draws from the case's seed."""
     return random_arm(np.random.default_rng(case.key.details["seed"]), case.truth.model)
 
 
 def _missed(case: Kept, name: str, windows: list[tuple[int, int]], starts: Starts) -> Iterator[Array]:
-    """Mean square error of every window, shape (n_joints,)."""
+    """Yield the mean square position error of every window of a log [rad^2 or m^2], shape (n_joints,)."""
     table, encoders = case.inputs.holdout[name], _encoders(case, name)
     rig = simulated_arm_of(arm_of(case), case.key.effects, name)
     plant = Plant(rig.config)
@@ -119,9 +119,9 @@ def _missed(case: Kept, name: str, windows: list[tuple[int, int]], starts: Start
 
 
 def displaced(plant: Plant, rig: SimulatedArm, error_q: Array, error_dq: Array, tau: Array) -> Array:
-    """Positions after a displaced start, with everything that the arm remembers, and motors behind a shaft or play, as they are.
+    """Return positions simulated from a start that is displaced by the given errors, shape (n_samples, n_joints); the plant is unchanged.
 
-    A motor's state is no measurement of the window's start: predictions carry it along the log.
+    Latent states, such as a motor behind an elastic shaft, are not displaced: predictions carry them along the log without measurement.
     """
     rig = copy.deepcopy(rig)
     twin: Any = Plant(rig.config)
@@ -133,7 +133,7 @@ def displaced(plant: Plant, rig: SimulatedArm, error_q: Array, error_dq: Array, 
 
 
 def run_commands(plant: Plant, rig: SimulatedArm, tau: Array) -> Array:
-    """Positions after each of the rows of held commands."""
+    """Advance the plant under the held commands `tau`; return the positions after each row, shape (n_samples, n_joints)."""
     q = np.empty((len(tau), plant.n))
     for k, command in enumerate(tau.tolist()):
         if not plant.state_dependent and all(a.constant for a in rig.actuators):
@@ -146,6 +146,6 @@ def run_commands(plant: Plant, rig: SimulatedArm, tau: Array) -> Array:
 
 
 def rows_of(t: Array, starts: Sequence[float]) -> list[tuple[int, int]]:
-    """First and last rows of consecutive windows of a log whose first predicted samples have these times since its start."""
+    """Return first and last rows of consecutive windows of a log; `starts` are the times of their first predicted samples since its start [s]."""
     first = np.searchsorted(t - t[0], np.array(starts) - 1e-6) - 1
     return list(itertools.pairwise([*map(int, first), len(t) - 1]))

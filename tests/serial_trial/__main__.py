@@ -1,4 +1,4 @@
-"""Make cases of a seed, ask the diagnosis, print how it did: ``python -m tests.serial_trial --help``."""
+"""Make the cases of a seed, diagnose them, print how often the answers are right: ``python -m tests.serial_trial --help``."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Motions: references, controllers, disturbances, encoders, and the simulation of a log."""
+"""Motions of the trial: references, controllers, disturbances, encoders, and the simulation of a log."""
 
 from __future__ import annotations
 
@@ -15,36 +15,36 @@ from .effects import TURN, Effect, Moment, Use
 
 Array = NDArray[np.float64]
 
-#: Sample periods [s].
+#: Sample periods of logs of torques [s].
 PERIODS = (0.002, 0.004, 0.005, 0.008)
-#: Sample periods of logs of references [s].
+#: Sample periods of logs of references in place of torques [s].
 COMMANDED_PERIODS = (0.002, 0.004, 0.005, 0.008, 0.01)
-#: Natural frequencies [rad/s] that servos give the nominal arm's inertia, and their damping ratios.
+#: Smallest and largest natural frequency [rad/s] that a servo's gains give the nominal arm's inertia, by kind of servo.
 SERVOS = {"stiff": (25.0, 45.0), "soft": (8.0, 14.0)}
 _DAMPING = (0.4, 1.0)
-#: Sines in a reference and their band [Hz].
+#: Number of sines in a reference, and range of their frequencies [Hz].
 _SINES, _BAND_HZ = 5, (0.05, 0.8)
-#: Time over which a motion begins [s].
+#: Time over which a motion is faded in from rest [s].
 _FADE_S = 1.5
-#: Cut-off of the velocity that a controller takes from the encoders [Hz].
+#: Cut-off of the low-pass filter for the velocity that a controller computes from encoder positions [Hz].
 _VELOCITY_HZ = 60.0
-#: A position this far outside its range, or this far off its reference, ends a draw [rad or m].
+#: Largest position beyond the joint's range, and largest error from the reference, of a usable log [rad or m].
 _OUTSIDE = 0.5
 
 
 @dataclass(frozen=True)
 class Controller:
-    """What makes the torques.
+    """Source of the commanded torques.
 
     Attributes
     ----------
     kind : {"pd", "computed_torque", "excited", "open", "stiff", "soft"}
-        PD with the nominal arm's gravity; the same with the nominal inverse dynamics of the reference; weak PD with gravity beside a
-        multisine torque of its own; a torque table that is played back; a servo that knows nothing of the arm, `kd` on the measured velocity.
+        PD with gravity of the nominal arm; PD with the nominal inverse dynamics of the reference; weak PD with gravity and an added multisine
+        torque; a torque table that is played back; and two servos without any model of the arm, with `kd` on the measured velocity.
     kp, kd : ndarray, shape (n,)
-        Gains.
+        Proportional and derivative gains.
     played : ndarray, shape (n_samples, n_joints), optional
-        Torques beside those of the PD controller, or alone if it is open.
+        Torques added to those of the PD controller, or the torque table itself of kind ``"open"`` [N m or N].
     """
 
     kind: str
@@ -54,13 +54,13 @@ class Controller:
 
     @property
     def is_servo(self) -> bool:
-        """Whether it runs at every step of the integration, whatever the log's period."""
+        """Whether the controller is a servo, which runs at every integration step, whatever the log's sample period."""
         return self.kind in SERVOS
 
 
 @dataclass(frozen=True)
 class Reference:
-    """Positions, velocities and accelerations that a controller is to follow, shape (n_samples, n_joints) each."""
+    """Positions, velocities and accelerations that a controller follows, shape (n_samples, n_joints) each."""
 
     q: Array
     dq: Array
@@ -69,18 +69,18 @@ class Reference:
 
 @dataclass(frozen=True)
 class Run:
-    """One log and its truth.
+    """One simulated log and its true motion.
 
     Attributes
     ----------
     t : ndarray, shape (n_samples,)
         Times [s].
     q, tau : ndarray, shape (n_samples, n_joints)
-        Positions as encoders show them, and commands, held until the next sample; of a servo with the gains that are stated, their mean.
+        Positions that encoders show, and commands held until the next sample; of a servo, mean commands by the gains that the arm file states.
     true_q, true_dq, true_ddq : ndarray, shape (n_samples, n_joints)
-        The joints' motion at the samples.
+        True positions, velocities and accelerations of the joints at the samples.
     applied : ndarray, shape (n_samples, n_joints)
-        Torques beside friction that acted on the joints at the samples.
+        Torques other than friction that acted on the joints at the samples [N m or N].
     """
 
     t: Array
@@ -92,14 +92,14 @@ class Run:
     applied: Array
 
     def sane(self, robot: SerialRobot, reference: Reference, *, follows: bool) -> bool:
-        """Whether the log is one that somebody would keep: every joint moves, in its range and where it should, and commands do not chatter.
+        """Return whether the log is usable: every joint moves, within its range and near its reference, and commands do not chatter.
 
         Parameters
         ----------
         robot, reference
-            What moved, and what it was to follow.
+            Arm that moved, and reference of its controller.
         follows : bool
-            Whether the controller is one that keeps near the reference.
+            Whether the controller keeps the arm near the reference.
         """
         if not np.isfinite(self.true_q).all():
             return False
@@ -112,7 +112,7 @@ class Run:
 
 
 def draw_reference(robot: SerialRobot, samples: int, period: float, rng: np.random.Generator) -> Reference:
-    """Draw a multisine in the band that keeps to the joints' ranges and speeds, from rest."""
+    """Draw a multisine reference that starts from rest and keeps to the joints' ranges and speeds."""
     t = period * np.arange(samples)
     s = np.minimum(t / _FADE_S, 1.0)
     fade = s**3 * (10 - 15 * s + 6 * s**2)
@@ -133,7 +133,7 @@ def draw_reference(robot: SerialRobot, samples: int, period: float, rng: np.rand
 def draw_controller(
     kind: str, robot: SerialRobot, reference: Reference, period: float, rng: np.random.Generator
 ) -> Controller:
-    """Draw a controller whose gains suit the inertia that the nominal arm has along the reference; `played` is left to the case."""
+    """Draw a controller with gains for the nominal arm's inertia along the reference; its field `played` is left empty."""
     model = robot.model(friction=False)
     data = mujoco.MjData(model)
     inertia = np.zeros(robot.n)
@@ -165,7 +165,7 @@ def draw_torque(size: Array, samples: int, period: float, rng: np.random.Generat
 
 
 def coloured(size: Array, time: Array, samples: int, period: float, rng: np.random.Generator) -> Array:
-    """Return torques of first-order Gauss-Markov noise with standard deviations `size` and correlation times `time`."""
+    """Return first-order Gauss-Markov noise torques with standard deviations `size` and correlation times `time` [s], (n_samples, n_joints)."""
     decay = np.exp(-period / time)
     kicks = rng.standard_normal((samples, len(size))) * size * np.sqrt(1 - decay**2)
     out = np.empty((samples, len(size)))
@@ -177,7 +177,7 @@ def coloured(size: Array, time: Array, samples: int, period: float, rng: np.rand
 
 
 def use_of(run: Run) -> Use:
-    """How the joints are used in a log."""
+    """Return the statistics of the joints' motion in a log, by which sizes of effects are chosen."""
     period = run.t[1]
 
     def rms(x: Array) -> Array:
@@ -199,21 +199,21 @@ def simulate(
     disturbance: Array,
     period: float,
 ) -> Run:
-    """Simulate one log from rest at the reference.
+    """Simulate one log that starts at rest at the reference.
 
-    The controller knows the nominal arm, positions as encoders show them, and velocities from these. Torques are held over each step of
-    the Runge-Kutta integration: along motions of this kind accelerations are within 0.02 % of those with steps ten times shorter.
+    The controller knows the nominal arm, the positions that encoders show, and velocities computed from these. Torques are held over each
+    step of the Runge-Kutta integration: along such motions accelerations are within 0.02 % of those with steps ten times shorter.
 
     Parameters
     ----------
     truth, nominal : SerialRobot
-        The arm with the effect in it, and as the controller has it.
+        The arm that moves, with the effect in it, and the nominal arm, which the controller knows.
     effect : Effect
         The hidden effect.
     reference, controller
-        What is followed, and how.
+        Reference that is followed, and controller that follows it.
     disturbance : ndarray, shape (n_samples, n_joints)
-        Torques that the log does not show.
+        Torques on the joints that the log does not show [N m or N].
     period : float
         Sample period [s], a whole number of integration steps.
     """
@@ -224,12 +224,12 @@ def simulate(
     if controller.is_servo:
         effect.begin(np.zeros(n))
     else:
-        # Drives have held the arm for long.
+        # Before the log, drives have held the arm at rest.
         effect.begin(side.command(controller, reference, 0, reference.q[0], np.zeros(n), truth.effort))
-    # At rest where the encoders show the reference.
+    # The arm starts at rest where the encoders show the reference.
     data.qpos[:] = 2 * reference.q[0] - effect.reading(reference.q[0])
     if controller.is_servo:
-        # At rest where the servos carry the arm's weight.
+        # The arm starts at rest where the servos' position errors carry its weight.
         mujoco.mj_forward(model, data)
         data.qpos[:] -= data.qfrc_bias / controller.kp
     out = {name: np.empty((samples, n)) for name in ("q", "tau", "true_q", "true_dq", "true_ddq", "applied")}
@@ -271,7 +271,7 @@ def simulate(
 
 
 class _Servo:
-    """PD controllers at every step: what they are said to do, and what they do."""
+    """PD servos at every integration step, with the gains that the arm file states and the gains that they really have."""
 
     def __init__(self, controller: Controller, robot: SerialRobot) -> None:
         self.kp, self.kd = controller.kp, controller.kd
@@ -279,7 +279,7 @@ class _Servo:
         self.stated = np.zeros(robot.n)
 
     def command(self, effect: Effect, reference: Array, data: Any) -> Array:
-        """Return the torques of this step; `stated` holds those that stated gains give with a reference in time."""
+        """Return the torques of this integration step; `stated` gets the torques of the stated gains for an undelayed reference."""
         q, moved = data.qpos.copy(), 1e-6
         shown = effect.reading(q)
         speed = (effect.reading(q + moved * data.qvel) - shown) / moved
@@ -291,7 +291,7 @@ class _Servo:
 
 
 class _Nominal:
-    """The nominal arm as a controller uses it."""
+    """Model of the nominal arm inside a controller, and the controller's command."""
 
     def __init__(self, robot: SerialRobot) -> None:
         self.viscous = robot.viscous
@@ -299,7 +299,7 @@ class _Nominal:
         self.data: Any = mujoco.MjData(self.model)
 
     def command(self, by: Controller, reference: Reference, k: int, q: Array, dq: Array, effort: Array) -> Array:
-        """Return the torques of sample `k` from what the encoders show."""
+        """Return the commanded torques of sample `k` from the positions and velocities that the encoders show."""
         if by.kind == "open":
             assert by.played is not None
             return by.played[k]

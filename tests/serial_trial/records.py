@@ -1,4 +1,4 @@
-"""Answers of many cases, found in processes of one thread each and written as they arrive."""
+"""Records of answers to many cases, computed in processes of one thread each and written as they arrive."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 
 import click
 
-#: What decides how many threads a process takes.
+#: Environment variables that set the number of threads of a process.
 THREADS = ("RAYON_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "POLARS_MAX_THREADS")
 
 
@@ -23,22 +23,22 @@ def collect(
     file: Path | None,
     timeout: float | None = None,
 ) -> list[dict[str, Any]]:
-    """Return the answers of the cases ``numbers`` of a seed, in their order.
+    """Return the records of the answers to the cases `numbers` of a seed, in their order.
 
     Parameters
     ----------
     answer : callable
-        Answer of the case of a seed and a number; another process calls it, so it must be picklable.
+        Function of a seed and a case's number that returns the record; another process calls it, so it must be picklable.
     jobs : int
-        Processes side by side.
+        Number of parallel processes.
     file : Path or None
-        File for the answers, one JSON object a line.
+        File for the records, one JSON object a line.
     timeout : float, optional
         Longest time for a case [s].
 
     Notes
     -----
-    A case that fails does not end the run; its answer has ``number``, ``seed`` and ``failed``, the error's type and text.
+    A case that fails does not end the run; its record has ``number``, ``seed`` and ``failed``, the error's type and text.
     """
     os.environ.update(dict.fromkeys(THREADS, "1"))
     from pebble import ProcessPool
@@ -50,7 +50,7 @@ def collect(
         for number, task in zip(numbers, tasks, strict=True):
             try:
                 record = task.result()
-            except Exception as error:  # counted as an answer
+            except Exception as error:  # a failure is recorded as an answer
                 record = {"number": number, "seed": seed, "failed": f"{type(error).__name__}: {error}"}
             records.append(record)
             if file is not None:

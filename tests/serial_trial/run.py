@@ -1,4 +1,4 @@
-"""Ask the diagnosis about cases, compare its answers with the keys, and print tables."""
+"""Diagnose cases, compare the answers with the keys, and print tables."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from .case import Case, make_case
 
 Record = dict[str, Any]
 
-#: What an answer may be, the best first: the first cause is the hidden effect on its joint; it has that among its look-alikes; a later cause
-#: is; a wrong value of the arm file was estimated right and no cause was named; no cause is named though a candidate is the hidden effect;
-#: no cause is named; the first cause is another effect on the right joint; neither effect nor joint are right.
+#: Classes of answers, best first: the first cause is the hidden effect on its joint; one of its equivalents is; a later cause is; no cause is
+#: named but a wrong value of the arm file was estimated right; no cause is named but a candidate is the hidden effect; no cause is named; the
+#: first cause is another effect on the right joint; the first cause is wrong in effect and joint.
 OUTCOMES = ("right", "look-alike", "later", "value", "candidate", "not named", "joint only", "wrong")
-#: A rotor inertia that is estimated to within this share is right.
+#: Largest relative error at which an estimated rotor inertia or viscous friction counts as right.
 _VALUE = 0.2
-#: End of the names of effects that are on every joint.
+#: Suffix of the names of effects that act on every joint.
 _ALL = "_all"
-#: Effects on a row over two joints, with their names in the library.
+#: Hidden effects that depend on a weighted sum of two joints' positions or velocities, with their names in the library.
 _ON_ROW = {"cable_spring": "joint_spring", "coupled_transmission": "coupled_transmission"}
-#: Entries of a key that an answer takes along.
+#: Entries of a case's key that are copied into the record of its answer.
 _TOLD = (
     "seed", "number", "draw", "effect", "joint", "values", "outside", "change", "family", "joints", "kinds", "period", "noise", "controller",
     "above_floor", "moved", "visible",
@@ -32,7 +32,7 @@ _TOLD = (
 
 
 def ask(case: Case) -> Record:
-    """Diagnose a case; return its key beside what was found."""
+    """Diagnose a case; return the record with entries of its key, the diagnosis' causes and other results, and the outcome."""
     began = time.perf_counter()
     found = armgap.diagnose(case.training, case.arm, holdout=case.holdout)
     seconds = time.perf_counter() - began
@@ -49,12 +49,12 @@ def ask(case: Case) -> Record:
 
 
 def answer(seed: int, number: int, *, commanded: bool = False) -> Record:
-    """Make a case and diagnose it."""
+    """Make a case, diagnose it, and return the record of the answer."""
     return ask(make_case(seed, number, commanded=commanded))
 
 
 def is_hidden(record: Record, name: dict[str, Any]) -> bool:
-    """Whether a cause, a candidate or an equivalent is what the case hides; an effect of all joints may be named on any of them."""
+    """Return whether a cause, candidate or equivalent is the hidden effect; an effect on all joints may be named on any joint."""
     effect = record["effect"]
     if effect.endswith(_ALL):
         return bool(name["effect"] == effect.removesuffix(_ALL))
@@ -66,7 +66,7 @@ def is_hidden(record: Record, name: dict[str, Any]) -> bool:
 
 
 def outcome(record: Record) -> str:
-    """Return which of the `OUTCOMES` an answer is; without an effect to be found it is ``"not named"`` or ``"wrong"``."""
+    """Return which of the `OUTCOMES` an answer is; for a case without an effect of the library, ``"not named"`` or ``"wrong"``."""
     causes = record["causes"]
     if record["effect"] == "null" or record["outside"]:
         return "wrong" if causes else "not named"
@@ -85,7 +85,7 @@ def outcome(record: Record) -> str:
 
 
 def _restored(record: Record) -> bool:
-    """Whether a rotor inertia that the arm file has wrong was estimated right, or damping of a servo as the viscous friction that it is."""
+    """Return whether a wrong rotor inertia of the arm file was estimated right, or a servo's additional damping as viscous friction."""
     if record["effect"] == "controller_damping":
         true = record["theta"][11 * record["joints"] + record["joint"] - 1] + record["values"]["difference"]
         return bool(abs(record["parameters"][f"viscous{record['joint']}"] / true - 1) < _VALUE)
@@ -96,7 +96,7 @@ def _restored(record: Record) -> bool:
 
 
 def report(records: list[Record]) -> str:
-    """Return the tables, and every case that is not right, as text."""
+    """Return the tables of outcomes and a line for every case whose answer is not right, as text."""
     failed = [r for r in records if "failed" in r]
     answers = [r for r in records if "failed" not in r]
     hidden = [r for r in answers if r["effect"] != "null" and not r["outside"]]
@@ -150,7 +150,7 @@ def _counts(records: list[Record]) -> list[str]:
 
 
 def _line(r: Record) -> str:
-    """One case that is not right: what is hidden and what was said."""
+    """Return a line about a case whose answer is not right: hidden effect, its values, and what the diagnosis named."""
 
     def place(c: dict[str, Any]) -> str:
         joints = "/".join(map(str, c.get("joints") or [c["joint"] or ""]))

@@ -1,4 +1,4 @@
-"""Settings of servos that follow a reference, which a case may hide (Siciliano 2009, section 8.2)."""
+"""Hidden effects on the settings of servos that follow a reference (Siciliano 2009, section 8.2)."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .effects import EFFECTS, Effect
 
 @dataclass
 class ControllerGain(Effect):
-    """The proportional gain is `gain` times what the arm file says."""
+    """Proportional gain of a joint's servo that is `gain` times the arm file's."""
 
     gain: float
     name: ClassVar[str] = "controller_gain"
@@ -30,7 +30,7 @@ class ControllerGain(Effect):
 
 @dataclass
 class ControllerDamping(Effect):
-    """The derivative gain is larger by `difference` than the arm file says; on the measured velocity this is viscous friction."""
+    """Derivative gain of a joint's servo above the arm file's by `difference`; on the measured velocity this acts as viscous friction."""
 
     difference: float
     name: ClassVar[str] = "controller_damping"
@@ -47,7 +47,7 @@ class ControllerDamping(Effect):
 
 @dataclass
 class ReferenceDelay(Effect):
-    """The reference arrives `time` [s] late, a whole number of steps; what is measured does not."""
+    """Delay of the reference by `time` [s], a whole number of integration steps; measured positions are not delayed."""
 
     time: float
     name: ClassVar[str] = "reference_delay"
@@ -72,4 +72,4 @@ class ReferenceDelay(Effect):
 COMMANDED: dict[str, type[Effect]] = EFFECTS | {
     effect.name: effect for effect in (ControllerGain, ControllerDamping, ReferenceDelay)
 }
-"""Those of arms behind servos that follow a reference."""
+"""Classes of the effects that are hidden in arms whose servos follow a reference, by name."""

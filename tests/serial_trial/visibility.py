@@ -1,9 +1,9 @@
-"""Whether a hidden effect can be seen at all, after the arm's parameters have been estimated again.
+"""Visibility of a hidden effect: whether it leaves a trace in the logs after re-estimation of the arm's parameters.
 
-Torques along the logged positions, both low-passed alike, are regressed on the arm's parameters with the arm file's standard deviations as prior
-(Siciliano 2009, section 7.2: the Newton-Euler recursion is linear in the ten numbers of each link). The same is done along the same
-references without the effect. It is visible if it leaves a multiple of what stays without it, on training logs and holdout, or if the parameters end
-up far from the arm file's.
+Torques along the logged positions, with the same low-pass filter on both, are regressed on the arm's parameters, with the arm file's standard
+deviations as prior (Siciliano 2009, section 7.2: the Newton-Euler recursion is linear in the ten numbers of each link). The same is done for
+runs without the effect along the same references. The effect is visible if its RMS residual is a multiple of that without it, on training logs
+and holdout, or if the estimated parameters differ much from those without it.
 """
 
 from __future__ import annotations
@@ -19,33 +19,33 @@ from .motion import Run
 
 Array = NDArray[np.float64]
 
-#: Visible: on one joint at least this multiple of the RMS torque that stays without the effect ...
+#: Smallest ratio of RMS torque residuals with and without a visible effect on one joint ...
 MULTIPLE = 2.0
-#: ... or parameters that are at least this many of the arm file's standard deviations from where they are without it. Both as in the trial of two
-#: links (docs/trial-scores.md).
+#: ... or smallest distance between the parameters re-estimated with and without it, in the arm file's standard deviations. Both limits are those
+#: of the trial of two-link arms (docs/trial-scores.md).
 SIGMAS = 5.0
-#: Standard deviation of the Gaussian filter of positions and torques [s]: it passes the motion, not the steps of the encoder.
+#: Standard deviation of the Gaussian filter of positions and torques [s]: it passes the motion but not the encoder's steps.
 FILTER_S = 0.02
-#: Rows are this far apart [s].
+#: Time between consecutive rows of the regression [s].
 SPACING_S = 0.01
-#: A joint slower than this share of its RMS speed may be at rest, where dry friction is a bound and no datum ...
+#: Share of a joint's RMS speed below which the joint may be at rest, where dry friction is a bound and not a datum ...
 _SLOW = 0.01
-#: ... and rows of which it rests for more than this share do not count.
+#: ... and largest share of such samples, weighted by the filter, with which a row is used.
 _AT_REST = 0.002
-#: Torques that no filter or rounding is below, as a share of the joint's RMS torque.
+#: Smallest RMS torque residual that is used in ratios, as a share of the joint's RMS torque.
 _FLOOR = 1e-3
 
 
 @dataclass(frozen=True)
 class Visibility:
-    """How far an effect stands out.
+    """Visibility of a hidden effect in the logs of a case.
 
     Attributes
     ----------
     above_floor : float
-        RMS torque that stays after re-estimation over what stays without the effect: largest of the joints, smaller of training logs and holdout.
+        Ratio of the RMS torque residuals after re-estimation with and without the effect: largest of the joints, smaller of training and holdout.
     moved : float
-        Distance of the re-estimated parameters with and without the effect, in the arm file's standard deviations.
+        Distance between the parameters re-estimated with and without the effect, in the arm file's standard deviations.
     """
 
     above_floor: float
@@ -53,25 +53,25 @@ class Visibility:
 
     @property
     def visible(self) -> bool:
-        """Whether it can be found."""
+        """Whether the effect is visible, so that a diagnosis can find it."""
         return self.above_floor >= MULTIPLE or self.moved >= SIGMAS
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the entries of a key."""
+        """Return the entries of a case's key about visibility."""
         return {**asdict(self), "visible": self.visible}
 
 
 def visibility(robot: SerialRobot, sigma: Array, plain: list[Run], logs: list[Run]) -> Visibility:
-    """Return how far a hidden effect stands out.
+    """Return the visibility of a hidden effect.
 
     Parameters
     ----------
     robot : SerialRobot
         The nominal arm.
     sigma : ndarray, shape (13 n,)
-        The arm file's standard deviations.
+        Standard deviations of the arm file.
     plain, logs : list of Run
-        The logs without and with the effect; the last is the holdout.
+        Runs without and with the effect; the last of each is the holdout.
     """
     rows = [[Rows(robot, run) for run in runs] for runs in (plain, logs)]
     scale = np.sqrt(np.mean([np.mean(r.torque**2, axis=0) for r in rows[0]], axis=0))
@@ -83,13 +83,13 @@ def visibility(robot: SerialRobot, sigma: Array, plain: list[Run], logs: list[Ru
 
 
 def _refit(theta: Array, sigma: Array, rows: list[Rows], scale: Array) -> tuple[Array, Array]:
-    """Parameters that fit the training logs, with the weights that their residuals ask for; RMS residuals of training and holdout, shape (2, n)."""
+    """Return parameters fitted to the training logs, weighted by RMS residuals per joint, and RMS residuals of training and holdout, shape (2, n)."""
     *training, holdout = rows
     known = sigma > 0
     found, rms = theta.copy(), 0.05 * scale
     for _ in range(4):
         weight = 1.0 / np.maximum(rms, _FLOOR * scale)
-        # A quarter of the rows counts: disturbances and filter have memories of some hundredths of a second.
+        # Residuals are correlated over some hundredths of a second by disturbances and filter, so a quarter of the rows is counted.
         normal, right = np.diag(sigma[known] ** -2), np.zeros(known.sum())
         for r in training:
             columns = 0.5 * r.regressor[:, :, known] * weight[:, None]
@@ -109,7 +109,7 @@ def _rms(rows: list[Rows], theta: Array) -> Array:
 
 
 class Rows:
-    """Torques and their regressor along one log, low-passed; `regressor` has the shape (n_rows, n, 13 n), and is zero where the joint may be at
+    """Low-pass filtered torques and their regressor along one log; `regressor`, shape (n_rows, n, 13 n), is zero where the joint may be at
     rest (`moving` is false).
     """
 
@@ -124,7 +124,7 @@ class Rows:
             flat = x.reshape(len(x), -1)
             return np.stack([np.convolve(column, kernel, "same") for column in flat.T], axis=1).reshape(x.shape)
 
-        # The torque is held over the period that follows its sample.
+        # Torques are held until the next sample, so the mean of two commands is the torque at a sample.
         held = np.vstack([run.tau[:1], 0.5 * (run.tau[:-1] + run.tau[1:])])
         q = smooth(run.q)
         dq = np.gradient(q, period, axis=0)
@@ -143,12 +143,12 @@ class Rows:
         self.regressor *= self.moving[:, :, None]
 
     def left(self, theta: Array) -> Array:
-        """Return what parameters leave of the torques, shape (n_rows, n)."""
+        """Return the residual torques of the parameters `theta`, shape (n_rows, n)."""
         return np.asarray(self.torque - self.regressor @ theta)
 
 
 def links(robot: SerialRobot, q: Array, dq: Array, ddq: Array) -> Array:
-    """Return the torques per unit of the ten numbers of each link, shape (n_rows, n, 10 n), by the Newton-Euler recursion."""
+    """Return the regressor of the links' ten inertial parameters, shape (n_rows, n, 10 n), by the Newton-Euler recursion."""
     rows, n = q.shape
     out = np.zeros((rows, n, 10 * n))
     turning = [_turn(robot, j, q[:, j]) for j in range(n)]
@@ -178,7 +178,7 @@ def links(robot: SerialRobot, q: Array, dq: Array, ddq: Array) -> Array:
 
 
 def _turn(robot: SerialRobot, j: int, q: Array) -> tuple[Array, Array]:
-    """Axes of link `j` in the link before, shape (n_rows, 3, 3), and its origin there, shape (n_rows, 3)."""
+    """Return the axes of link `j` in the previous link's frame, shape (n_rows, 3, 3), and its origin there [m], shape (n_rows, 3)."""
     axis, rotation = robot.axis[j], robot.rotation[j]
     if not robot.rotary[j]:
         return np.tile(rotation, (len(q), 1, 1)), robot.translation[j] + np.outer(q, rotation @ axis)
@@ -188,14 +188,14 @@ def _turn(robot: SerialRobot, j: int, q: Array) -> tuple[Array, Array]:
 
 
 def _cross(x: Array) -> Array:
-    """Matrices of the cross product, shape (n_rows, 3, 3)."""
+    """Return the matrices of the cross product with the vectors `x`, shape (n_rows, 3, 3)."""
     out = np.zeros((len(x), 3, 3))
     out[:, [2, 0, 1], [1, 2, 0]], out[:, [1, 2, 0], [2, 0, 1]] = x, -x
     return out
 
 
 def _wrench(spin: Array, gain: Array, linear: Array) -> tuple[Array, Array]:
-    """Force and moment about a link's origin per unit of its ten numbers, shape (n_rows, 3, 10) each."""
+    """Return force and moment about a link's origin per unit of its ten inertial parameters, shape (n_rows, 3, 10) each."""
 
     def inertia(x: Array) -> Array:
         out = np.zeros((len(x), 3, 6))

@@ -1,4 +1,4 @@
-"""What a case hides: one class per effect, with its law and how its size is drawn. Laws are those of the textbooks named beside them."""
+"""Hidden effects of the cases: one class per effect, with its law and the draw of its size. Each class or module names its textbook."""
 
 from __future__ import annotations
 
@@ -33,4 +33,4 @@ EFFECTS: dict[str, type[Effect]] = {
         DelayEverywhere, LoadFrictionEverywhere, CoupledTransmission,
     )
 }  # fmt: skip
-"""Every effect by name; `Null` is not among them."""
+"""Classes of all effects by name, without `Null`."""

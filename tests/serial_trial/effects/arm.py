@@ -1,4 +1,4 @@
-"""Effects of the arm itself."""
+"""Hidden effects on the arm itself: payload, tilt of the base, wrong link, wrong rotor inertia."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .effect import TURN, Array, Effect
 
 @dataclass
 class Payload(Effect):
-    """A load on the last link: its mass [kg] and centre [m]; a ball of 3 cm radius of gyration."""
+    """Payload on the last link: mass [kg] and centre of mass in the link's frame [m]; a ball with a radius of gyration of 3 cm."""
 
     mass: float
     com: Array
@@ -35,7 +35,7 @@ class Payload(Effect):
 
 @dataclass
 class BaseTilt(Effect):
-    """The base is not as the arm file says: turned about its axes x and y [rad] (Siciliano 2009, section 7.3: gravity in the base's frame)."""
+    """Base tilted about its x and y axes [rad] against the arm file (Siciliano 2009, section 7.3: gravity in the base's frame)."""
 
     x: float
     y: float
@@ -54,7 +54,7 @@ class BaseTilt(Effect):
 
 @dataclass
 class NominalLink(Effect):
-    """One link weighs `factor` times what the arm file says, and its inertia with it."""
+    """Mass and inertia of one link that are `factor` times the arm file's."""
 
     factor: float
     name: ClassVar[str] = "nominal_link"
@@ -69,7 +69,7 @@ class NominalLink(Effect):
 
 @dataclass
 class RotorInertia(Effect):
-    """A rotor that the arm file has not (`lacking`), or too small [kg m^2 or kg] (Siciliano 2009, section 5.2: geared rotors)."""
+    """Rotor inertia [kg m^2 or kg] that the arm file lacks (`lacking`) or states too small (Siciliano 2009, section 5.2: geared rotors)."""
 
     inertia: float
     lacking: bool

@@ -1,4 +1,4 @@
-"""Effects of drives (Astrom 2008)."""
+"""Hidden effects of drives, between command and torque (Astrom 2008)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .effect import Effect, signed
 
 @dataclass
 class ActuatorLag(Effect):
-    """A first-order lag with time constant `time` [s] between command and torque."""
+    """First-order lag with time constant `time` [s] between commanded and delivered torque."""
 
     time: float
     name: ClassVar[str] = "actuator_lag"
@@ -27,7 +27,7 @@ class ActuatorLag(Effect):
     def drive(self, command):
         apart, decay = self._state - command[self.joint], math.exp(-STEP / self.time)
         out = command.copy()
-        # The mean over the step.
+        # Mean of the lagged torque over the integration step.
         out[self.joint] = command[self.joint] + apart * (1.0 - decay) * self.time / STEP
         self._state = command[self.joint] + apart * decay
         return out
@@ -35,7 +35,7 @@ class ActuatorLag(Effect):
 
 @dataclass
 class ActuatorDelay(Effect):
-    """Torques come `time` [s] late, a whole number of steps."""
+    """Delay of one joint's torque by `time` [s], a whole number of integration steps."""
 
     time: float
     name: ClassVar[str] = "actuator_delay"
@@ -57,7 +57,7 @@ class ActuatorDelay(Effect):
 
 @dataclass
 class TorqueSaturation(Effect):
-    """The drive delivers at most `level`."""
+    """Saturation: the drive delivers at most `level` [N m or N]."""
 
     level: float
     name: ClassVar[str] = "torque_saturation"
@@ -74,7 +74,7 @@ class TorqueSaturation(Effect):
 
 @dataclass
 class TorqueDeadZone(Effect):
-    """Commands below `level` give no torque, those above give less by as much."""
+    """Dead zone: commands below `level` [N m or N] give no torque, larger ones are reduced by `level`."""
 
     level: float
     name: ClassVar[str] = "torque_dead_zone"
@@ -91,7 +91,7 @@ class TorqueDeadZone(Effect):
 
 @dataclass
 class TorqueGain(Effect):
-    """The drive delivers `gain` times the command."""
+    """Torque gain: the drive delivers `gain` times the command."""
 
     gain: float
     name: ClassVar[str] = "torque_gain"

@@ -1,7 +1,7 @@
-"""What an effect is.
+"""Base class of the hidden effects of the trial, and the quantities that effects depend on.
 
 An effect may change the arm before it is simulated, the torque that a drive delivers, the torque or the level of dry friction at a joint, and
-what an encoder shows.
+the position that an encoder shows.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from ..arms import SerialRobot
 
 Array = NDArray[np.float64]
 TURN = 2.0 * math.pi
-#: Speed [rad/s or m/s] below which a joint has no direction.
+#: Speed [rad/s or m/s] below which a joint counts as at rest and dry friction has no direction.
 STILL = 1e-3
 
 
 @dataclass(frozen=True)
 class Use:
-    """How the joints are used in a motion, shape (n,) each: sizes of effects are stated against these.
+    """Statistics of the joints' motion, shape (n,) each, by which the sizes of effects are chosen.
 
-    RMS torque and its largest value, RMS acceleration and speed, positions that 2 % of the samples lie below and above.
+    RMS and largest torque, RMS acceleration and speed, 2 % and 98 % quantiles of position, RMS rate of the torque.
     """
 
     torque: Array
@@ -39,7 +39,7 @@ class Use:
 
 @dataclass
 class Moment:
-    """The state at one step: time [s], true positions and velocities, torques delivered, and torques that the links put on the joints."""
+    """State at one integration step: time [s], true positions and velocities, delivered torques, and load torques from the links."""
 
     t: float
     q: Array
@@ -50,9 +50,9 @@ class Moment:
 
 @dataclass
 class Effect:
-    """An effect on joint `joint`, from 0, or on the arm (None). This one does nothing.
+    """Hidden effect on joint `joint`, counted from 0, or on the whole arm (None). This base class has no effect.
 
-    `draw` makes one that takes about a share `share` of the joint's RMS torque; the case checks what it makes in fact.
+    `draw` aims at a change of about `share` of the joint's RMS torque; `case.make_case` measures the change that results.
     """
 
     joint: int | None
@@ -62,17 +62,17 @@ class Effect:
     """Whether armgap's library has no such effect."""
     per_joint: ClassVar[bool] = True
     trusted_inertia: ClassVar[bool] = False
-    """Whether the arm file of such a case trusts the inertias, because nothing else tells the effect."""
+    """Whether the arm file states small standard deviations of inertia, because otherwise no log reveals the effect."""
 
     @classmethod
     def draw(cls, robot: SerialRobot, joint: int | None, share: float, use: Use, rng: np.random.Generator) -> Effect:
-        """Draw its values."""
+        """Draw an effect of a size that changes the torque of a joint by about `share` of its RMS."""
         del robot, share, use, rng
         return cls(joint)
 
     @property
     def values(self) -> dict[str, Any]:
-        """Its values by name, SI."""
+        """Values of the effect's parameters by name, in SI units."""
         found = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "joint" and f.init}
         return {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in found.items()}
 
@@ -81,38 +81,38 @@ class Effect:
         return robot
 
     def without(self, robot: SerialRobot) -> SerialRobot:
-        """Return the arm without the effect, where it has that already: nominal and simulated arms begin with it."""
+        """Return the arm without the effect, if nominal and simulated arms contain it already."""
         return robot
 
     def begin(self, command: Array) -> None:
-        """Begin a log, in which drives have delivered `command` for long."""
+        """Reset the effect's state for a new log, before which the drives have delivered the constant torques `command`."""
 
     def drive(self, command: Array) -> Array:
-        """Return the torques that drives deliver during the next `STEP`."""
+        """Return the torques that drives deliver for `command` during the next integration step `STEP`."""
         return command
 
     def torque(self, now: Moment) -> Array | None:
-        """Return torques on the joints beside the drives'."""
+        """Return torques on the joints in addition to those of the drives; None for none."""
         del now
 
     def dry(self, now: Moment) -> Array | None:
-        """Return what dry friction of the joints has more than the Coulomb level."""
+        """Return the level of dry friction above the Coulomb level; None if it is unchanged."""
         del now
 
     def reading(self, q: Array) -> Array:
-        """Return what encoders show before they round."""
+        """Return the positions that encoders show before rounding."""
         return q
 
     def gains(self, kp: Array, kd: Array) -> tuple[Array, Array]:
-        """Return the gains that servos have where they are said to have these."""
+        """Return the gains that the servos really have, for the gains `kp` and `kd` that the arm file states."""
         return kp, kd
 
     def arriving(self, reference: Array) -> Array:
-        """Return the reference that servos know of during the next `STEP`."""
+        """Return the reference that the servos have received, for the reference of the next integration step `STEP`."""
         return reference
 
     def at(self, j: int, value: float, n: int) -> Array:
-        """Return a vector of zeros with one value."""
+        """Return a vector of `n` zeros with `value` at index `j`."""
         out = np.zeros(n)
         out[j] = value
         return out
@@ -124,6 +124,6 @@ def signed(rng: np.random.Generator) -> float:
 
 @dataclass
 class Null(Effect):
-    """Nothing is hidden."""
+    """No effect: nothing is hidden."""
 
     per_joint: ClassVar[bool] = False

@@ -1,4 +1,4 @@
-"""Effects of encoders (Gawronski 2008)."""
+"""Hidden effects of encoders (Gawronski 2008)."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .effect import TURN, Effect, signed
 
 @dataclass
 class EncoderOffset(Effect):
-    """The encoder shows `offset` more than the position."""
+    """Encoder offset: the encoder shows the position plus `offset` [rad or m]."""
 
     offset: float
     name: ClassVar[str] = "encoder_offset"
@@ -26,7 +26,7 @@ class EncoderOffset(Effect):
 
 @dataclass
 class EncoderEccentricity(Effect):
-    """The encoder's disc is off its centre: it shows ``a sin q + b cos q`` more."""
+    """Encoder eccentricity: the encoder shows the position plus ``a sin q + b cos q`` [rad], because its disc is off centre."""
 
     a: float
     b: float

@@ -1,4 +1,4 @@
-"""Effects of friction (Armstrong 1994; Bittencourt 2012; Hamon 2010)."""
+"""Hidden effects of friction (Armstrong 1994; Bittencourt 2012; Hamon 2010)."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .effect import STILL, TURN, Array, Effect, Moment, signed
 
 @dataclass
 class Stribeck(Effect):
-    """Friction ``amplitude exp(-(dq/velocity)^2)`` above the Coulomb level at low speed."""
+    """Stribeck friction: ``amplitude exp(-(dq/velocity)^2)`` [N m or N] above the Coulomb level."""
 
     amplitude: float
     velocity: float
@@ -29,7 +29,7 @@ class Stribeck(Effect):
 
 @dataclass
 class StribeckEverywhere(Effect):
-    """The same on every joint, with amplitudes in proportion to its Coulomb friction."""
+    """Stribeck friction on every joint, with amplitudes in proportion to the joint's Coulomb friction."""
 
     amplitude: Array
     velocity: Array
@@ -46,7 +46,7 @@ class StribeckEverywhere(Effect):
 
 @dataclass
 class CoulombAsymmetry(Effect):
-    """Coulomb friction larger by `delta` forward, smaller backward."""
+    """Coulomb friction that is larger by `delta` [N m or N] forward and smaller by `delta` backward."""
 
     delta: float
     name: ClassVar[str] = "coulomb_asymmetry"
@@ -61,7 +61,7 @@ class CoulombAsymmetry(Effect):
 
 @dataclass
 class ViscousAsymmetry(Effect):
-    """Viscous friction larger by `delta` forward, smaller backward."""
+    """Viscous friction that is larger by `delta` [N m s/rad or N s/m] forward and smaller by `delta` backward."""
 
     delta: float
     name: ClassVar[str] = "viscous_asymmetry"
@@ -77,7 +77,7 @@ class ViscousAsymmetry(Effect):
 
 @dataclass
 class QuadraticDrag(Effect):
-    """Drag in proportion to the square of the speed."""
+    """Quadratic drag: friction in proportion to the square of the velocity."""
 
     c: float
     name: ClassVar[str] = "quadratic_drag"
@@ -93,7 +93,7 @@ class QuadraticDrag(Effect):
 
 @dataclass
 class LoadDependentFriction(Effect):
-    """Dry friction in proportion to the torque that the gear passes on, inertia's part included (Hamon 2010)."""
+    """Dry friction in proportion to the torque that the gear transmits, including that for the inertia (Hamon 2010)."""
 
     mu: float
     name: ClassVar[str] = "load_dependent_friction"
@@ -108,7 +108,7 @@ class LoadDependentFriction(Effect):
 
 @dataclass
 class PositionDependentFriction(Effect):
-    """Dry friction that changes over the turn by ``amplitude cos(q - position)``; along a linear joint over `period`."""
+    """Change of dry friction with the position: ``amplitude cos(q - position)``; on a linear joint with a period in metres."""
 
     amplitude: float
     position: float
@@ -128,7 +128,7 @@ class PositionDependentFriction(Effect):
 
 @dataclass
 class FrictionWarmup(Effect):
-    """All friction of the joint is ``1 + amplitude exp(-t/time)`` times its warm value (Bittencourt 2012)."""
+    """Warm-up: all friction of the joint is ``1 + amplitude exp(-t/time)`` times its warm value (Bittencourt 2012)."""
 
     amplitude: float
     time: float

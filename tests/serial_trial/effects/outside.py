@@ -1,4 +1,4 @@
-"""Effects that armgap's library does not have."""
+"""Hidden effects that armgap's library does not have."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .effect import TURN, Effect, signed
 
 @dataclass
 class TorqueDrift(Effect):
-    """A torque that grows with time at `rate` [N m/s], from zero in the middle of 10 s."""
+    """Torque that grows linearly with time, at `rate` [N m/s], and is zero at 5 s."""
 
     rate: float
     name: ClassVar[str] = "torque_drift"
@@ -29,7 +29,7 @@ class TorqueDrift(Effect):
 
 @dataclass
 class CableSpring(Effect):
-    """A cable past two joints, `joint` and the next: it pulls on both with ``k (q_j + q_next - rest)``."""
+    """Cable along two neighbouring joints, `joint` and the next, that pulls on both with ``k (q_j + q_next - rest)``."""
 
     k: float
     rest: float
@@ -51,7 +51,7 @@ class CableSpring(Effect):
 
 @dataclass
 class LoadedCogging(Effect):
-    """Cogging in proportion to the torque: ``ratio tau sin(n q + phase)``."""
+    """Torque ripple in proportion to the delivered torque: ``ratio tau sin(n q + phase)``."""
 
     ratio: float
     n: float

@@ -1,4 +1,4 @@
-"""Effects on several joints at once."""
+"""Hidden effects on several joints."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .effect import Array, Effect, signed
 
 @dataclass
 class DelayEverywhere(Effect):
-    """All torques come `time` [s] late, a whole number of steps."""
+    """Delay of all torques by `time` [s], a whole number of integration steps."""
 
     time: float
     name: ClassVar[str] = "actuator_delay_all"
@@ -34,7 +34,7 @@ class DelayEverywhere(Effect):
 
 @dataclass
 class LoadFrictionEverywhere(Effect):
-    """Dry friction in proportion to the torque that the gear passes on, on every joint (Hamon 2010)."""
+    """Load-dependent friction on every joint: dry friction in proportion to the torque that the gear transmits (Hamon 2010)."""
 
     mu: Array
     name: ClassVar[str] = "load_dependent_friction_all"
@@ -50,8 +50,8 @@ class LoadFrictionEverywhere(Effect):
 
 @dataclass
 class CoupledTransmission(Effect):
-    """Friction of what turns with the sum or difference of two joints' motion, `joint` and the next (Siciliano 2009, section 5.1): it pulls on the
-    first with ``viscous v + coulomb sign(v)`` along ``v = dq_j + factor dq_next``, and on the next with `factor` times that.
+    """Friction of a part that turns with a combination of two joints, ``v = dq_j + factor dq_next`` (Siciliano 2009, section 5.1): its torque
+    ``viscous v + coulomb sign(v)`` acts against `joint`, and `factor` times this torque against the next joint.
     """
 
     factor: float
@@ -70,7 +70,7 @@ class CoupledTransmission(Effect):
 
     @staticmethod
     def pair(robot, joint):
-        """Return the first of two joints of one kind, at `joint` or next to it where there are such."""
+        """Return the first of two neighbouring joints of one kind: `joint`, or the nearest that has such a neighbour."""
         pairs = [j for j in range(robot.n - 1) if robot.kinds[j] == robot.kinds[j + 1]] or [0]
         return min(pairs, key=lambda j: abs(j - joint))
 

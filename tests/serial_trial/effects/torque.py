@@ -1,4 +1,4 @@
-"""Torques at the joint."""
+"""Hidden effects that are torques at a joint."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .effect import TURN, Effect, signed
 
 @dataclass
 class TorqueOffset(Effect):
-    """A constant torque."""
+    """Torque offset: a constant torque on the joint [N m or N]."""
 
     offset: float
     name: ClassVar[str] = "torque_offset"
@@ -26,7 +26,7 @@ class TorqueOffset(Effect):
 
 @dataclass
 class TorqueRipple(Effect):
-    """Cogging: ``amplitude sin(n q + phase)``, n periods a turn (or 2 pi a metre)."""
+    """Torque ripple (cogging): ``amplitude sin(n q + phase)``, with n periods per turn, or per 2 pi metres on a linear joint."""
 
     amplitude: float
     n: float
@@ -46,7 +46,7 @@ class TorqueRipple(Effect):
 
 @dataclass
 class JointSpring(Effect):
-    """A spring on the joint, such as a hose or a counterbalance."""
+    """Spring that acts on the joint, such as a hose or a counterbalance."""
 
     k: float
     q0: float
@@ -63,8 +63,8 @@ class JointSpring(Effect):
 
 @dataclass
 class Contact(Effect):
-    """A stop: a stiff spring and damper beyond a position, towards larger positions (`side` 1) or smaller (-1), which never pull (Siciliano
-    2009, section 9.2).
+    """Contact at a joint limit: a stiff spring and damper beyond a position, towards larger (`side` 1) or smaller (-1) positions, which never
+    pull (Siciliano 2009, section 9.2).
     """
 
     position: float

@@ -1,4 +1,4 @@
-"""Effects between motor and link (Spong 1987; Nordin and Gutman 2002)."""
+"""Hidden effects of the transmission between motor and link (Spong 1987; Nordin 2002)."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from .effect import Array, Effect
 
 @dataclass
 class Transmission(Effect):
-    """A motor of its own: rotor and friction of the joint turn with it, and the encoder shows its position.
+    """Motor with a position of its own: the joint's rotor inertia and friction belong to the motor, and the encoder shows its position.
 
-    It is integrated by the semi-implicit Euler method at the simulation's step, dry friction as an impulse that stops but does not reverse.
+    The motor is integrated by the semi-implicit Euler method with step `STEP`; dry friction is an impulse that stops but does not reverse it.
     """
 
     rotor: float
@@ -33,11 +33,11 @@ class Transmission(Effect):
         return replace(robot, rotor=bare(robot.rotor), viscous=bare(robot.viscous), coulomb=bare(robot.coulomb))
 
     def passed_on(self, deflection: float, rate: float) -> float:
-        """Return the torque that the link gets."""
+        """Return the torque that the transmission puts on the link, from its deflection and deflection rate."""
         raise NotImplementedError
 
     def deflection(self, torque: float) -> float:
-        """Return the deflection under a torque that has been there for long."""
+        """Return the static deflection under a constant torque."""
         raise NotImplementedError
 
     def begin(self, command):
@@ -63,7 +63,7 @@ class Transmission(Effect):
 
 @dataclass
 class JointElasticity(Transmission):
-    """A shaft between motor and link."""
+    """Joint elasticity: a spring and damper between motor and link."""
 
     stiffness: float
     damping: float
@@ -86,7 +86,7 @@ class JointElasticity(Transmission):
 
 @dataclass
 class Backlash(Transmission):
-    """Play between stiff flanks, 300 rad/s against the rotor."""
+    """Backlash between stiff flanks, whose spring gives the rotor a natural frequency of 300 rad/s."""
 
     gap: float
     name: ClassVar[str] = "backlash"
