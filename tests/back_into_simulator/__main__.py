@@ -1,4 +1,4 @@
-"""Diagnose, export, and step the exported files in MuJoCo: ``python -m tests.back_into_simulator --help``."""
+"""Diagnose and export arms, and simulate the exported files in MuJoCo: ``python -m tests.back_into_simulator --help``."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from typing import Any, NamedTuple
 
 import click
 
-#: What decides how many threads a process takes.
+#: Environment variables that set the number of threads of a process.
 THREADS = ("RAYON_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "POLARS_MAX_THREADS")
-#: MuJoCo's predictions are those of the diagnosis if their RMS error is within this share of its `gap.after`.
+#: Largest relative difference between the RMS error of MuJoCo's predictions and the diagnosis' `gap.after` that counts as agreement.
 CLOSE = 0.05
 _COLUMNS = ("before", "after", "MJCF", "URDF", "URDF, told")
 
 
 class Answer(NamedTuple):
-    """What was diagnosed, and per joint the gap after it: of the diagnosis, of the MJCF, of the URDF as it is, and told what it has no field for."""
+    """Verdict and causes of a diagnosis, gap before it, and gaps per joint after it: by the diagnosis, MJCF, URDF, and URDF with added fields."""
 
     verdict: str
     causes: str
@@ -56,7 +56,7 @@ def main(seed: int, only: tuple[int, ...]) -> None:
 
 
 def compare(case: Any) -> Answer:
-    """Diagnose a case, export it, and step the files over the windows of the holdout."""
+    """Diagnose a case, export it, and return the gaps of the exported files over the windows of the holdout."""
     import mujoco
     import numpy as np
 

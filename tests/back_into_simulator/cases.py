@@ -1,4 +1,4 @@
-"""Five arms of three to seven joints with one hidden effect each that MuJoCo has natively."""
+"""Five arms of three to seven joints with one hidden effect each, of kinds that MuJoCo can represent in its model files."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from tests.serial_trial.arms import SerialRobot
 from tests.serial_trial.case import Case, make_case
 from tests.serial_trial.effects import Effect
 
-#: Family of the arm, number of joints, and effect.
+#: Family of the arm, number of joints, and hidden effect of each case.
 CASES = (
     ("R-P-R", 3, "joint_spring"),
     ("SO-101-like", 4, "friction_change"),
@@ -22,7 +22,7 @@ CASES = (
 
 @dataclass
 class FrictionChange(Effect):
-    """Viscous and Coulomb friction of one joint are so many times what the arm file says."""
+    """Viscous and Coulomb friction of one joint are multiples of the arm file's values."""
 
     viscous: float
     coulomb: float
@@ -43,7 +43,7 @@ class FrictionChange(Effect):
 
 
 def make(seed: int, number: int) -> Case:
-    """Make one of the `CASES`."""
+    """Make the case of one of the `CASES`, given by its number."""
     family, joints, effect = CASES[number]
     hidden = FrictionChange if effect == FrictionChange.name else effect
     return make_case(seed, number, hidden, family=family, joints=joints)

@@ -1,4 +1,4 @@
-"""Windows of a log, their measured starts, and how far a MuJoCo model misses them."""
+"""Windows of a log, their measured starts, and the prediction error of a MuJoCo model over the windows."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-#: Half widths of local cubics, in samples, and how many standard deviations their velocities may lie apart (docs/decisions/037-measured-starts.md).
+#: Half widths of local cubics in samples, and largest difference of their velocities in standard deviations (docs/decisions/037-measured-starts.md).
 HALF_WIDTHS = (3, 4, 6, 8, 11, 15, 20, 27)
 CONFIDENCE = 2.0
 
 
 @dataclass(frozen=True)
 class Window:
-    """Samples `first` to `last` of a log: positions and velocities measured at `first`, the samples behind it to be predicted."""
+    """Samples `first` to `last` of a log, with position and velocity measured at `first`, from which the samples after it are predicted."""
 
     first: int
     last: int
@@ -30,7 +30,7 @@ def windows_of(diagnosis: dict[str, Any], t: Array, q: Array) -> list[Window]:
     """Return the windows of the only holdout log of a diagnosis, with their measured starts."""
     series = next(s for s in diagnosis["series"] if s["joint"] == 1)
     stamps = np.array(series["t"])
-    # The first sample that is predicted is the one behind the start.
+    # The first predicted sample is the one after the start.
     firsts = [int(np.argmin(np.abs(t - stamps[k]))) - 1 for k in series["window_start"]]
     lasts = [*firsts[1:], int(np.argmin(np.abs(t - stamps[-1])))]
     sigma = np.array(diagnosis["noise"]["position_sigma"])
@@ -42,7 +42,7 @@ def windows_of(diagnosis: dict[str, Any], t: Array, q: Array) -> list[Window]:
 
 
 def _measured(t: Array, q: Array, at: int, sigma: float) -> tuple[float, float]:
-    """Position and velocity at a sample: of the widest cubic but one whose velocity agrees with those of all narrower ones."""
+    """Return position and velocity at a sample from a local cubic: the second widest of those whose velocities agree with all narrower ones."""
     kept, low, high = [], -np.inf, np.inf
     for half in HALF_WIDTHS:
         count = 2 * half + 1
@@ -63,18 +63,18 @@ def _measured(t: Array, q: Array, at: int, sigma: float) -> tuple[float, float]:
 
 
 def missed(model: Any, windows: list[Window], t: Array, q: Array, tau: Array, *, apply_torque: bool) -> Array:
-    """Return the RMS error per joint of a compiled MuJoCo model over all windows, shape (n_joints,).
+    """Return the RMS position error per joint of a compiled MuJoCo model over all windows [rad or m], shape (n_joints,).
 
     Parameters
     ----------
     model : mujoco.MjModel
-        Joints in the order of the log.
+        Compiled model, with the joints in the order of the log.
     windows : list of Window
-        Where to begin and end.
+        Windows of the log over which the model is simulated.
     t, q, tau : ndarray
-        The log.
+        Time stamps, positions and torques of the log.
     apply_torque : bool
-        Whether torques act on the joints directly, for a model without actuators; else they are the actuators' commands.
+        Whether torques act on the joints directly, for a model without actuators; otherwise the torques are the actuators' commands.
     """
     data = mujoco.MjData(model)
     squares, rows = np.zeros(q.shape[1]), 0

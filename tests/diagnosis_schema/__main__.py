@@ -1,4 +1,4 @@
-"""Make cases, diagnose them, hold their JSON against the schema: ``python -m tests.diagnosis_schema --help``."""
+"""Make cases, diagnose them, compare the JSON with its schema: ``python -m tests.diagnosis_schema --help``."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from tempfile import TemporaryDirectory
 
 import click
 
-#: What decides how many threads a process takes.
+#: Environment variables that set the number of threads of a process.
 THREADS = ("RAYON_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "POLARS_MAX_THREADS")
 
 
 def planar(seed: int, cases: int) -> Iterator[tuple[str, str]]:
-    """Names and JSON texts of diagnoses of planar arms."""
+    """Yield name and JSON text of the diagnoses of planar arms."""
     from armgap import diagnose
     from armgap.trial.cases.making import make_cases
     from armgap.trial.cases.sealed import SealedCase
@@ -27,7 +27,7 @@ def planar(seed: int, cases: int) -> Iterator[tuple[str, str]]:
 
 
 def serial(seed: int, cases: int) -> Iterator[tuple[str, str]]:
-    """Names and JSON texts of diagnoses of serial arms, every other one behind position controllers."""
+    """Yield name and JSON text of the diagnoses of serial arms, every other one behind position controllers."""
     from armgap import diagnose
 
     from ..serial_trial.case import make_case

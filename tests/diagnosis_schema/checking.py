@@ -1,4 +1,4 @@
-"""What is asked of a diagnosis' JSON: it fits the schema, it holds nothing else, and reading it loses nothing."""
+"""Checks of a diagnosis' JSON: it fits its schema, has no keys beyond those of the schema, and is unchanged when read and written."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 
 from armgap.diagnosis import Cause, Diagnosis, diagnosis_schema
 
-#: Fields of the typed result whose keys are elsewhere in the JSON object: class and field, and the path of keys to it.
+#: Fields of the typed result with other keys in the JSON object: class and field, mapped to the path of keys.
 ELSEWHERE = {
     ("Gap", "free_run_before"): ("free_run", "before"),
     ("Gap", "free_run_after"): ("free_run", "after"),
@@ -22,7 +22,7 @@ ELSEWHERE = {
 
 
 def closed(schema: Any) -> Any:
-    """The schema with no keys allowed but those that it lists, so that a key without a type is found."""
+    """Return the schema without permission for keys that it does not list, so that a key without a type is found."""
     if isinstance(schema, dict):
         inner = {key: closed(value) for key, value in schema.items()}
         return inner | {"additionalProperties": False} if isinstance(schema.get("properties"), dict) else inner
@@ -39,12 +39,12 @@ def _validator() -> Any:
 
 
 def misfits(data: Any) -> list[str]:
-    """Where a JSON object differs from the schema."""
+    """Return the differences of a JSON object from the schema, one text each."""
     return [f"{error.json_path}: {error.message}" for error in _validator().iter_errors(data)]
 
 
 def losses(text: str) -> list[str]:
-    """What is lost or changed when the text of a diagnosis is read and written again, or said otherwise by the typed result."""
+    """Return what differs after the text of a diagnosis is read and written again, or between the text and the typed result."""
     data = json.loads(text)
     result = Diagnosis.from_dict(json.loads(text))
     found = [] if result.to_json(indent=None) == text else ["$: the text differs"]
@@ -52,7 +52,7 @@ def losses(text: str) -> list[str]:
 
 
 def _differences(typed: Any, data: Any, place: str) -> list[str]:
-    """Where a typed value does not say what its JSON says; keys that a type does not have are in `Diagnosis.extra`, or not its own."""
+    """Return where a typed value differs from its JSON; keys without a field of the type are expected in `Diagnosis.extra`."""
     if is_dataclass(typed) and not isinstance(typed, type):
         found = []
         for field in fields(typed):

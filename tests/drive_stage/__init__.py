@@ -1,1 +1,1 @@
-"""Whether the stage of the chain is right at which a hidden effect sits: ``python -m tests.drive_stage --help``."""
+"""Trial of the stages of the drive chain: is the largest share of the gap at the hidden effect's stage? ``python -m tests.drive_stage --help``."""

@@ -1,7 +1,7 @@
-"""Add the torque that a drive delivered to logs of the trial's generator, and ask for the stage of the gap.
+"""Add measured torques to logs of blind cases, and ask for the stage of the drive chain at which the gap arises.
 
-Cases hide one effect, in the drive (between command and torque) or behind it. The delivered torque is that of the generator's actuator, sampled at
-the log's times, with white noise of one per cent. An answer is right if the stage with the largest share is the effect's.
+Each case hides one effect, in the drive (between command and torque) or in the mechanics. The measured torque is that of the generator's
+actuator at the log's times, with white noise of 1 % of its RMS. An answer is right if the stage with the largest share is the effect's stage.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ THREADS = ("RAYON_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "POLA
 DRIVE = (
     "actuator_delay", "actuator_lag", "torque_gain", "torque_saturation", "torque_dead_zone", "motor_hysteresis", "slew_limit",
 )  # fmt: skip
-#: Behind the drive, and no sensor.
+#: Effects in the mechanics: behind the drive, and not in a sensor.
 MECHANICS = (
     "stribeck", "quadratic_drag", "cubic_drag", "coulomb_asymmetry", "viscous_asymmetry", "load_dependent_friction", "position_dependent_friction",
     "friction_warmup", "joint_spring", "hardening_spring", "rotor_inertia", "rotor_coupling", "contact", "payload", "base_tilt", "torque_offset",
@@ -33,7 +33,7 @@ NOISE, HORIZON = 0.01, 0.25
 
 
 def main() -> None:
-    """Ask of every case that hides one effect at a known stage."""
+    """Print the answer and its correctness for every case that hides one effect at a known stage."""
     parser = argparse.ArgumentParser(prog="python -m tests.drive_stage", description=__doc__)
     parser.add_argument("--seed", type=int, required=True)
     parser.add_argument(
@@ -59,7 +59,7 @@ def main() -> None:
 
 
 def _wanted(options: argparse.Namespace) -> Iterator[tuple[str, Path]]:
-    """Stage and folder of the first visible cases with one effect at that stage; made where they are missing."""
+    """Yield stage and folder of the first visible cases with one effect in the drive or in the mechanics; make those that are missing."""
     left = {"drive": options.each, "mechanics": options.each}
     for name, plan in trial_plans(options.seed, options.cases, 10.0).items():
         hidden = [wish[0] if isinstance(wish, tuple) else wish for wish in plan.effects]
@@ -76,7 +76,7 @@ def _wanted(options: argparse.Namespace) -> Iterator[tuple[str, Path]]:
 
 
 def delivered(case: Kept, log: str, rng: np.random.Generator) -> np.ndarray:
-    """Torque that reaches the joints at the log's times, shape (n_samples, n_joints), with noise of a part of its size."""
+    """Return the torque that reaches the joints at the log's times [N m or N], (n_samples, n_joints), with noise of a share `NOISE` of its RMS."""
     from armgap.trial.cases.case import simulated_arm_of
     from armgap.trial.simulation.plant import Plant
 
@@ -93,7 +93,7 @@ def delivered(case: Kept, log: str, rng: np.random.Generator) -> np.ndarray:
 
 
 def _asked(stage: str, folder: Path) -> tuple[str, str, str]:
-    """The stage, the case, and the answer: stages with their shares, largest first."""
+    """Return the hidden effect's stage, name and effect of the case, and the three stages with the largest shares of the gap, largest first."""
     from armgap import Arm, Log
     from armgap.diagnosis.drive_chain import drive_chain
 

@@ -1,4 +1,4 @@
-"""Make the runs of a seed, estimate, print bias and coverage: ``python -m tests.feedback_study --help``."""
+"""Make the runs of a seed, estimate parameters, print bias and coverage: ``python -m tests.feedback_study --help``."""
 
 from __future__ import annotations
 

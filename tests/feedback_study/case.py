@@ -1,4 +1,4 @@
-"""Runs: an arm, its nominal model, and logs of its motion in closed loop, all of it from a seed and a number."""
+"""Runs of the study: an arm, its nominal model, and logs of its motion in closed loop, all drawn from a seed and a number."""
 
 from __future__ import annotations
 
@@ -15,28 +15,28 @@ Array = NDArray[np.float64]
 
 FAMILY, JOINTS = "Panda-like", 7
 PERIOD_S = 0.004
-#: Length of each training log and of the holdout, of which nothing is estimated [s].
+#: Lengths of each training log and of the holdout log, which is not used for estimates [s].
 TRAINING_S, HOLDOUT_S = 12.0, 4.0
 LOGS = ("train-1", "train-2", "holdout-1")
-#: Correlation times of the disturbance, drawn for each joint on a logarithmic scale [s].
+#: Smallest and largest correlation time of the disturbance, drawn for each joint on a logarithmic scale [s].
 CORRELATION_S = (0.005, 0.1)
-#: The nominal model is off by up to these shares: inertial values, rotor inertias, friction.
+#: Largest relative errors of the nominal model: of inertial values, rotor inertias, friction.
 OFF = (0.08, 0.24, 0.4)
-#: Time between the knots of a spline [s].
+#: Smallest and largest time between the knots of a spline [s].
 _KNOTS_S = (0.6, 1.2)
 _DRAWS = 40
 
 
 @dataclass(frozen=True)
 class Case:
-    """One run.
+    """One run of the study.
 
     Attributes
     ----------
     truth, nominal : SerialRobot
-        The arm that moves, and the model that controller and arm file have of it.
+        Arm that moves, and nominal model of it in controller and arm file.
     quiet, disturbed : list of Run
-        The logs along the same references with the encoders' steps alone, and with the disturbance.
+        Logs along the same references without and with the disturbance; both have the encoders' steps.
     times : ndarray, shape (n,)
         Correlation times of the disturbance [s].
     """
@@ -49,24 +49,24 @@ class Case:
 
 
 def draw_truth(seed: int) -> SerialRobot:
-    """Draw the arm of all runs of a seed."""
+    """Draw the arm that all runs of a seed share."""
     return draw_robot(np.random.default_rng([seed, 0]), FAMILY, JOINTS)
 
 
 def make_case(seed: int, number: int, share: float) -> Case:
-    """Make a run.
+    """Make one run of the study.
 
     Parameters
     ----------
     seed, number : int
-        They decide everything; the arm depends on the seed alone.
+        Seed of the study and number of the run, which decide everything; the arm depends on the seed alone.
     share : float
         Standard deviation of the disturbance, as a share of each joint's RMS torque.
 
     Raises
     ------
     RuntimeError
-        If no draw keeps to the arm's range.
+        If no draw gives a motion within the arm's range.
     """
     truth = draw_truth(seed)
     for draw in range(_DRAWS):
@@ -98,7 +98,7 @@ def _draw(truth: SerialRobot, rng: np.random.Generator, share: float) -> Case | 
 
 
 def draw_spline(robot: SerialRobot, samples: int, period: float, rng: np.random.Generator) -> Reference:
-    """Draw a cubic spline through random positions within the joints' ranges, from rest, that keeps to their speeds."""
+    """Draw a cubic spline through random positions within the joints' ranges as a reference that starts from rest and keeps to their speeds."""
     t = period * np.arange(samples)
     q = np.empty((samples, robot.n))
     for j in range(robot.n):

@@ -1,4 +1,4 @@
-"""Estimates of a run in base parameters, with the standard deviations that the library gives them."""
+"""Estimates of the base parameters from the logs of a run, with the standard deviations that armgap gives them."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from .case import LOGS, PERIOD_S, make_case
 Array = NDArray[np.float64]
 Record = dict[str, Any]
 
-#: How far the arm file trusts the links; rotors are trusted to within their own size, friction to within half of it, as in arm files.
+#: Trust of the arm file in the links' values; standard deviations of rotor inertias are their own size, of friction half of it, as in arm files.
 TRUST = "guess"
-#: Scheme of the recursive least squares beside the diagnosis.
+#: Scheme of the recursive least squares that is compared with the diagnosis.
 SCHEME = "filtered-dynamic"
 
 
 def loose_arm(robot: SerialRobot) -> armgap.Arm:
-    """Return the arm as a file with the default standard deviations of that trust describes it."""
+    """Return the arm as an arm file with the default standard deviations of :data:`TRUST` describes it."""
     arm = arm_of(robot, PERIOD_S, "published")
     assert arm.chain is not None
     inertial = arm.theta[: 10 * robot.n].reshape(robot.n, 10)
@@ -39,9 +39,9 @@ def loose_arm(robot: SerialRobot) -> armgap.Arm:
 def in_base_parameters(arm: armgap.Arm, base: BaseParameters) -> armgap.Arm:
     """Return the arm with base parameters in the place of its parameters.
 
-    A diagnosis gives standard deviations of single parameters and no covariance, from which those of their sums do not follow. Of an arm
-    whose dependent parameters are not estimated, each independent parameter is its base parameter less a constant, with the same
-    standard deviation. It has the prior standard deviation of the whole sum.
+    A diagnosis gives standard deviations of single parameters but no covariance, which the standard deviations of their sums would need. If the
+    dependent parameters of an arm are not estimated, each independent parameter equals its base parameter minus a constant, with the same
+    standard deviation. Its prior standard deviation is that of the whole sum.
     """
     columns, dependent = list(base.columns), list(base.dependent)
     sigma = np.zeros_like(arm.sigma)
@@ -50,7 +50,7 @@ def in_base_parameters(arm: armgap.Arm, base: BaseParameters) -> armgap.Arm:
 
 
 def diagnosed(runs: list[Run], arm: armgap.Arm) -> tuple[Array, Array, list[str]]:
-    """Return re-estimated parameters and their standard deviations, shape (13 n,) each, and the checks of the input that spoke."""
+    """Return re-estimated parameters and their standard deviations, shape (13 n,) each, and the names of the input checks that fired."""
     logs = [armgap.Log.from_arrays(r.t, r.q, r.tau, name=name, arm=arm) for name, r in zip(LOGS, runs, strict=True)]
     found = armgap.diagnose(logs[:-1], arm, holdout=logs[-1:], max_causes=0)
     values = [found.parameters["refit"][name] for name in arm.parameter_names]

@@ -1,4 +1,4 @@
-"""Bias and coverage of the estimates over the runs, as tables."""
+"""Bias and coverage of the estimated base parameters over the runs, as tables."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Record = dict[str, Any]
 
-#: Median relative standard deviation below which motion determines a base parameter.
+#: Median relative standard deviation below which a base parameter counts as determined by the motion.
 DETERMINED = 0.1
-#: Targets: a bias of at most this share of the value or so many standard errors of the mean, and the share of the 95 % intervals that hold the truth.
+#: Targets: largest bias as a share of the value or in standard errors of the mean, and range of the share of 95 % intervals that hold the truth.
 BIAS, ERRORS, COVERAGE = 0.05, 2.0, (0.92, 0.98)
 #: Half of a 95 % interval, in standard deviations.
 _REACH = 1.959963984540054
@@ -21,20 +21,20 @@ _REACH = 1.959963984540054
 
 @dataclass(frozen=True)
 class Summary:
-    """How estimates of base parameters compare with the truth, over the runs and for those parameters that motion determines.
+    """Comparison of estimated base parameters with the truth over the runs, for those parameters that motion determines.
 
     Attributes
     ----------
     names : tuple of str
-        Base parameters.
+        Names of the base parameters that motion determines.
     sigma : ndarray, shape (n_determined,)
-        Median standard deviation, as a share of the value.
+        Median standard deviation of the estimates, as a share of the value.
     bias, error : ndarray, shape (n_determined,)
-        Mean of the errors as a share of the value, and the standard error of that mean.
+        Mean error of the estimates as a share of the value, and the standard error of that mean.
     scatter : ndarray, shape (n_determined,)
-        RMS over the runs of the error less its mean, in the standard deviation that the run's estimate was given.
+        RMS over the runs of the error minus its mean, in units of the standard deviation that the run's estimate was given.
     held : ndarray, shape (n_determined,)
-        Share of the runs whose 95 % interval holds the truth.
+        Share of the runs whose 95 % interval holds the true value.
     """
 
     names: tuple[str, ...]
@@ -51,21 +51,21 @@ class Summary:
 
     @property
     def coverage(self) -> float:
-        """Share of all intervals that hold the truth."""
+        """Share of the 95 % intervals of all parameters and runs that hold the true value."""
         return float(np.mean(self.held)) if len(self.held) else float("nan")
 
 
 def summary(records: list[Record], condition: str, estimate: str = "estimate", sigma: str = "sigma") -> Summary:
-    """Compare the estimates of one condition with the truth.
+    """Compare the estimates from one kind of logs with the truth.
 
     Parameters
     ----------
     records : list of dict
-        Answers of `estimates.ask`, two or more.
+        Records that `estimates.ask` returned, two or more.
     condition : {"quiet", "disturbed"}
-        Logs.
+        Logs without or with the disturbance.
     estimate, sigma : str
-        Entries of the condition with estimates and standard deviations.
+        Keys of estimates and standard deviations in the records' entry for the condition.
     """
     truth = np.array(records[0]["truth"])
     found, given = (np.array([record[condition][key] for record in records]) for key in (estimate, sigma))
@@ -85,7 +85,7 @@ def summary(records: list[Record], condition: str, estimate: str = "estimate", s
 
 
 def report(records: list[Record]) -> str:
-    """Return the tables as text."""
+    """Return the tables of bias and coverage as text."""
     failed = [r for r in records if "failed" in r]
     answers = [r for r in records if "failed" not in r]
     lines = [f"{len(answers)} runs, {len(failed)} failed", *(f"run {r['number']}: {r['failed']}" for r in failed), ""]
@@ -126,7 +126,7 @@ def _table(found: Summary) -> list[str]:
 
 
 def _verdict(found: Summary) -> list[str]:
-    """Return how many parameters meet the targets; of 50 intervals of 95 % fewer than 46 hold the truth by chance for one parameter in ten."""
+    """Return how many parameters meet the targets; by chance one parameter in ten has fewer than 46 of 50 intervals that hold the truth."""
     count, (low, high) = len(found.names), COVERAGE
     if not count:
         return ["no base parameter is determined"]

@@ -1,4 +1,4 @@
-"""Fleets with a robot whose friction rises: ``python -m tests.fleet_drift --help``."""
+"""Fleets in which the friction of one robot rises: ``python -m tests.fleet_drift --help``."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-#: What decides how many threads a process takes; each process has one.
+#: Environment variables that set the number of threads of a process; each process has one.
 THREADS = ("RAYON_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "POLARS_MAX_THREADS")
 SETTINGS = {"max_content_width": 100, "show_default": True}
 

@@ -1,4 +1,4 @@
-"""The fleet asked after every visit, and tests that know more."""
+"""Answers of a fleet after every visit, and two reference tests that know the onset of the drift."""
 
 from __future__ import annotations
 
@@ -11,25 +11,25 @@ import polars as pl
 
 from .truth import Array, Design, robot_name
 
-#: False alarms per visit of the tests that know more: about what a whole fleet has.
+#: False alarms per visit of the reference tests: about as many as a whole fleet has.
 ALLOWED = 1e-3
-#: Visits after what a test needs that knows more, within which a drift counts as found in time.
+#: Largest number of visits by which the fleet may find a drift later than a reference test, to be in time.
 IN_TIME = 5
 Named = tuple[str, str]
 
 
 @dataclass(frozen=True)
 class Answers:
-    """What a fleet said.
+    """Answers of a fleet and of the reference tests about one drift.
 
     Attributes
     ----------
     found : int or None
-        Visits after the onset until the drift was named.
+        Visits after the onset until the fleet named the drift; None if it never did.
     known, onset_known : int or None
-        The same of the test that knows robot, parameter and onset, and of the one that knows the onset only.
+        Visits after the onset until the reference test found the drift that knows robot, parameter and onset, or only the onset.
     false : frozenset of (robot, parameter)
-        What was named and does not drift.
+        Robots and parameters that the fleet named and that do not drift.
     """
 
     found: int | None
@@ -39,14 +39,14 @@ class Answers:
 
 
 def in_time(found: int | None, test: int | None) -> bool:
-    """Whether a drift was found in time; where not even the test finds it, it is not asked for."""
+    """Return whether the fleet found a drift within :data:`IN_TIME` visits of a reference test; true if the test does not find it."""
     return test is None or (found is not None and found <= test + IN_TIME)
 
 
 def ask(
     rows: pl.DataFrame, design: Design, truth: Named | None, named: Callable[[pl.DataFrame], list[Named]]
 ) -> Answers:
-    """Ask after every visit; `named` is the fleet's own answer to a table of parameters, which here also has the column `visit`."""
+    """Return the answers after every visit; `named` returns the drifts that a fleet names from estimates without the column `visit`."""
     found, false = None, set()
     for seen in range(1, design.visits + 1):
         answer = named(rows.filter(pl.col("visit") < seen).drop("visit"))
@@ -59,7 +59,7 @@ def ask(
 
 
 def _with_onset(rows: pl.DataFrame, design: Design, truth: Named, tests: int) -> int | None:
-    """Visits after the onset until the ramp from it on stands out of a known scatter, among so many series."""
+    """Return the visits after the onset until the slope of the parameter's logarithm is significant for a known scatter and number of tests."""
     robot, name = truth
     one = rows.filter((pl.col("robot") == robot) & (pl.col("name") == name)).sort("visit")
     logs, visits = np.log(one["value"].to_numpy()), one["visit"].to_numpy()
@@ -76,12 +76,12 @@ def _with_onset(rows: pl.DataFrame, design: Design, truth: Named, tests: int) ->
 
 
 def truth_name(robot: int, name: str) -> Named:
-    """What an answer has to name."""
+    """Return robot and parameter of the true drift as an answer names them."""
     return robot_name(robot), name
 
 
 def report(answers: Sequence[Answers], nulls: Sequence[Answers]) -> str:
-    """Return the table."""
+    """Return the table of delays and false alarms as text."""
     false = sum(bool(a.false) for a in answers)
     known = sum(in_time(a.found, a.known) for a in answers)
     onset_known = sum(in_time(a.found, a.onset_known) for a in answers)

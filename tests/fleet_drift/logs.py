@@ -1,4 +1,4 @@
-"""Logs of a whole fleet from the blind trial's physics engine, and their diagnoses."""
+"""Logs of a whole fleet from the physics engine of the blind trial, and their diagnoses."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from armgap.trial.simulation.simulated_arm import SimulatedArm, Trace, run
 from .judging import ask, report, truth_name
 from .truth import Array, Design, Truth, day, draw, robot_name
 
-#: Motions drawn for a visit before the fleet is given up.
+#: Largest number of motions drawn for a visit before the study ends with an error.
 ATTEMPTS = 40
 PERIOD_S = 0.004
 
 
 def study(seed: int, model: str, robots: int, duration: float, workers: int, folder: Path) -> str:
-    """Make, diagnose and ask one fleet; return the tables."""
+    """Make and diagnose the logs of one fleet, ask which parameters drift, and return the tables."""
     rng = np.random.default_rng([seed, robots])
     design = Design(robots=robots)
     arms = [random_arm(rng, model, PERIOD_S) for _ in range(robots)]
@@ -62,7 +62,7 @@ def _friction(arm: TrialArm) -> list[str]:
 
 
 def _at(arm: TrialArm, factors: Array) -> TrialArm:
-    """The arm with its friction times factors, viscous before Coulomb."""
+    """Return the arm with its friction multiplied by factors, viscous friction of all joints before Coulomb friction."""
     viscous, coulomb = np.split(np.array(arm.viscous + arm.coulomb) * factors, 2)
     return replace(arm, viscous=tuple(viscous.tolist()), coulomb=tuple(coulomb.tolist()))
 
@@ -88,7 +88,7 @@ def _make(
 
 
 def _motion(rng: np.random.Generator, arm: TrialArm, duration: float) -> Trace:
-    """A random motion that a controller tracks, drawn again until the arm moves enough."""
+    """Return a random motion that a controller tracks, drawn again until the arm moves enough."""
     vigour = float(rng.uniform(0.8, 1.3))
     for _ in range(ATTEMPTS):
         trace = run(SimulatedArm(PlantConfig(arm)), draw_excitation(rng, arm, "tracked", vigour).source(arm), duration)
@@ -118,7 +118,7 @@ def _true_rows(arms: list[TrialArm], truth: Truth, design: Design) -> pl.DataFra
 
 
 def _errors(rows: pl.DataFrame, true: pl.DataFrame) -> str:
-    """What estimates miss by: relative standard errors, errors over these, and their correlation with the true scatter."""
+    """Return a table of the estimates' errors: relative standard errors, errors over these, and correlation with the true scatter."""
     keys = ["robot", "name", "visit"]
     both = rows.join(true.select(*keys, true="value"), on=keys)
     lines = [

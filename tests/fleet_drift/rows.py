@@ -7,7 +7,7 @@ import polars as pl
 
 from .truth import Design, Truth, day, robot_name
 
-#: Parameters of a two-link arm: name, whether it is friction, median of the relative standard error and spread of its logarithm, and
+#: Parameters of a two-link arm: name, whether it is friction, median of the relative standard error and standard deviation of its logarithm, and
 #: RMS of errors over stated standard errors. Measured by ``python -m tests.fleet_drift logs --seed 2 --model geared --robots 4``.
 PARAMETERS: tuple[tuple[str, bool, float, float, float], ...] = (
     ("theta1", False, 0.00036, 0.7, 0.5),
@@ -24,7 +24,7 @@ FRICTION = [name for name, friction, *_ in PARAMETERS if friction]
 
 
 def table(rng: np.random.Generator, design: Design, truth: Truth) -> pl.DataFrame:
-    """Return the rows of a fleet as ``parameters.parquet`` holds them, in the order of the visits."""
+    """Return the estimates of a fleet as rows of ``parameters.parquet`` with a column `visit`, in the order of the visits."""
     parts = []
     shape = (design.robots, design.visits)
     for name, friction, median, spread, ratio in PARAMETERS:

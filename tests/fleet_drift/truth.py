@@ -1,4 +1,4 @@
-"""Friction of the robots of a fleet at their visits."""
+"""True friction of the robots of a fleet at their visits."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ FIRST_DAY = date(2026, 1, 5)
 
 @dataclass(frozen=True)
 class Design:
-    """What a fleet is like.
+    """Properties of a simulated fleet.
 
     Attributes
     ----------
     robots, visits : int
-        Sizes.
+        Number of robots, and of visits of each robot.
     scatter : float
         Standard deviation of the logarithm of each friction parameter from visit to visit, independent.
     common : float
-        The same of a factor that all robots have on a day.
+        Standard deviation of the logarithm of a random factor that all robots share on a day, one for each friction parameter.
     rate : float
-        Relative rise per visit of the one that drifts.
+        Relative rise per visit of the friction parameter that drifts.
     onset : int
-        Visits before it begins.
+        Number of visits before the drift begins.
     spread : float
-        Standard deviation of the logarithm of the robots' own scatter.
+        Standard deviation of the logarithm of the factor by which each robot's scatter differs from `scatter`.
     """
 
     robots: int = 20
@@ -43,14 +43,14 @@ class Design:
 
 @dataclass(frozen=True)
 class Truth:
-    """Factors on friction, shape (n_friction, n_robots, n_visits), and the friction parameter and the robot that rise; None where none does."""
+    """Factors on friction, shape (n_friction, n_robots, n_visits), and indices of the friction parameter and robot that drift, or None."""
 
     factors: Array
     rising: tuple[int, int] | None
 
 
 def draw(rng: np.random.Generator, design: Design, n_friction: int, *, drift: bool = True) -> Truth:
-    """Draw a fleet."""
+    """Draw the friction factors of a fleet, with a drift of one parameter of one robot unless `drift` is false."""
     shape = (n_friction, design.robots, design.visits)
     own = design.scatter * np.exp(design.spread * rng.standard_normal(design.robots))
     logs = own[:, None] * rng.standard_normal(shape) + design.common * rng.standard_normal(
@@ -64,10 +64,10 @@ def draw(rng: np.random.Generator, design: Design, n_friction: int, *, drift: bo
 
 
 def robot_name(robot: int) -> str:
-    """Name of a robot."""
+    """Return the name of a robot for its index."""
     return f"robot {robot + 1:02d}"
 
 
 def day(visit: int) -> str:
-    """Day of a visit, ISO 8601."""
+    """Return the date of a visit for its index, in ISO 8601."""
     return (FIRST_DAY + timedelta(days=visit)).isoformat()

@@ -1,7 +1,7 @@
-"""A fleet of some hundred entries, some of them broken: one command, restarts, both engines, scaling.
+"""Test of a fleet of some hundred entries, some of them broken: one command, restarts, both engines, scaling with workers.
 
-Entries are made from cases of the blind trial (``armgap trial make``): each case is a robot with two visits, whose second one is judged on the log
-that the first was trained on. Some are broken, each in another way (`broken`). From the top of the repository::
+Entries are made from cases of the blind trial (``armgap trial make``): each case is a robot with two visits; the second visit has the first
+visit's training log as its holdout. Some entries are broken, each in another way (`broken`). From the top of the repository::
 
     armgap trial make -n 250 --duration 3 --seed 1 -o CASES
     python -m tests.fleet_size entries CASES --broken 10 -o FLEET
@@ -11,11 +11,11 @@ that the first was trained on. Some are broken, each in another way (`broken`). 
     python -m tests.fleet_size overhead FLEET
 
 ==============  ==============================================================================================
-file            what
+file            content
 ==============  ==============================================================================================
-`entries`       manifest and broken files
+`entries`       manifest of the fleet and broken files
 `broken`        ways in which an entry is broken
-`running`       the command killed and started again; the same manifest on a Ray cluster; tables compared
-`scaling`       one worker and two, in turns; what the fleet itself costs per entry
+`running`       command killed and started again; the same manifest on a Ray cluster; comparison of the tables
+`scaling`       speed of one worker and of two; processor time of the fleet per entry apart from diagnosis
 ==============  ==============================================================================================
 """

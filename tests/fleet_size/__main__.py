@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-#: What decides how many threads a process takes; each process has one.
+#: Environment variables that set the number of threads of a process; each process has one.
 THREADS = ("RAYON_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "POLARS_MAX_THREADS")
 CAUSES = click.option(
     "--max-causes", type=click.IntRange(0), help="Causes named at most; those of a diagnosis by default."

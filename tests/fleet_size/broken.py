@@ -1,4 +1,4 @@
-"""Ways in which an entry of a fleet is broken. Each takes copies of the entry's arm file and log, and spoils them."""
+"""Ways in which an entry of a fleet is broken: functions that damage copies of the entry's arm file and log."""
 
 from __future__ import annotations
 
@@ -7,57 +7,57 @@ from pathlib import Path
 
 import polars as pl
 
-#: Given the arm file and the training log, both to be overwritten or removed.
+#: Function of the paths of an arm file and a training log, which overwrites or removes one of them.
 Way = Callable[[Path, Path], None]
 
 
 def no_log(arm: Path, log: Path) -> None:
-    """The log is not there."""
+    """Remove the log."""
     log.unlink()
 
 
 def no_arm(arm: Path, log: Path) -> None:
-    """The arm file is not there."""
+    """Remove the arm file."""
     arm.unlink()
 
 
 def empty_log(arm: Path, log: Path) -> None:
-    """The log holds nothing."""
+    """Make the log an empty file."""
     log.write_bytes(b"")
 
 
 def cut_log(arm: Path, log: Path) -> None:
-    """The log was cut off while it was copied."""
+    """Cut the log file off, as an interrupted copy does."""
     log.write_bytes(log.read_bytes()[: log.stat().st_size // 2])
 
 
 def no_torque(arm: Path, log: Path) -> None:
-    """A column that is needed is missing."""
+    """Remove the torque column of joint 1."""
     _rewrite(log, lambda table: table.drop("tau1"))
 
 
 def few_rows(arm: Path, log: Path) -> None:
-    """The robot was stopped at once."""
+    """Keep only the first five rows of the log, as of a robot that was stopped at once."""
     _rewrite(log, lambda table: table.head(5))
 
 
 def backwards(arm: Path, log: Path) -> None:
-    """Time runs backwards."""
+    """Negate the time stamps of the log, so that time runs backwards."""
     _rewrite(log, lambda table: table.with_columns(t=-pl.col("t")))
 
 
 def no_positions(arm: Path, log: Path) -> None:
-    """The encoder was not connected."""
+    """Replace the positions of joint 1 by missing values, as of an encoder that was not connected."""
     _rewrite(log, lambda table: table.with_columns(q1=pl.lit(None, pl.Float64)))
 
 
 def no_toml(arm: Path, log: Path) -> None:
-    """The arm file is no TOML."""
+    """Make the arm file invalid TOML."""
     arm.write_text(arm.read_text(encoding="utf-8").replace("=", ":", 1), encoding="utf-8")
 
 
 def unknown_kind(arm: Path, log: Path) -> None:
-    """The arm file names a kind of arm that there is not."""
+    """Replace the kind of arm in the arm file by an unknown one."""
     lines = [
         ('kind = "delta"' if line.startswith("kind") else line) for line in arm.read_text(encoding="utf-8").splitlines()
     ]

@@ -1,4 +1,4 @@
-"""The manifest of a fleet made from cases of a trial, some of its entries broken."""
+"""Manifest of a fleet made from cases of a blind trial, some of whose entries are broken."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ DAYS = ("2026-01-05", "2026-01-06")
 
 
 def write_entries(cases: Path, broken: int, seconds: float, folder: Path) -> Path:
-    """Write the manifest of two entries per case with the first seconds of its logs; some are `broken`, in as many ways as there are."""
+    """Write the manifest of two entries per case with the first `seconds` of its logs; `broken` entries are damaged, by all `WAYS` in turn."""
     folder.mkdir(parents=True, exist_ok=True)
     entries = []
     for case in sorted(p for p in cases.iterdir() if (p / ARM).is_file()):

@@ -1,4 +1,4 @@
-"""The command killed and started again, and the same manifest on a Ray cluster."""
+"""Fleet command that is killed and started again, and the same manifest on a Ray cluster."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ LOCAL, ON_RAY = "local", "ray"
 
 
 def killed_and_restarted(folder: Path, kill_after: int, workers: int, options: list[str]) -> str:
-    """Start the command, kill it once so many entries stand, start it again; say what was repeated."""
+    """Start the fleet command, kill it when `kill_after` entries have results, start it again; return a text on what was repeated."""
     words = [*COMMAND, str(folder / "manifest.csv"), "-o", str(folder / LOCAL), "--workers", str(workers), *options]
     diagnoses = folder / LOCAL / "diagnoses"
     began = time.perf_counter()
@@ -43,7 +43,7 @@ def _standing(diagnoses: Path) -> dict[str, int]:
 
 
 def on_ray(folder: Path, nodes: int, most: int | None, options: list[str]) -> str:
-    """Run the manifest, or its first entries, on a cluster of so many nodes, and compare its tables with the local ones."""
+    """Run the manifest, or its first entries, on a Ray cluster of `nodes` nodes; return a text that compares its tables with the local ones."""
     lines = (folder / "manifest.csv").read_text(encoding="utf-8").splitlines()
     (folder / "ray.csv").write_text("\n".join(lines[: None if most is None else most + 1]) + "\n", encoding="utf-8")
     with _cluster(nodes) as address:
@@ -66,7 +66,7 @@ def on_ray(folder: Path, nodes: int, most: int | None, options: list[str]) -> st
 
 @contextmanager
 def _cluster(nodes: int) -> Iterator[str]:
-    """A Ray cluster of nodes with one processor each: its address."""
+    """Yield the address of a Ray cluster of `nodes` nodes with one processor each, which is stopped at the end."""
     from ray.cluster_utils import Cluster
 
     cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 1})
@@ -80,7 +80,7 @@ def _cluster(nodes: int) -> Iterator[str]:
 
 
 def compared(whole: Path, part: Path) -> str:
-    """Say whether two fleets' tables are the same but for the time they took, on the robots of the second."""
+    """Return a text that says whether two fleets' tables agree, apart from times of computation, on the robots of `part`."""
     lines = []
     robots = pl.read_parquet(part / "summary.parquet")["robot"].unique().to_list()
     for name in ("summary", "parameters"):

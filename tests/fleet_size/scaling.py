@@ -1,8 +1,8 @@
-"""One worker and two, in turns on the same entries; and what the fleet itself costs per entry.
+"""Speed of one worker and of two on the same entries, in turns; and processor time of the fleet per entry apart from diagnosis.
 
-The machine may be shared: speeds are compared within one round, and the median of the rounds counts. What the fleet itself costs is processor
-time: of entries that fail at once, less that of starting a worker, and of a run over a folder in which all results stand, which hashes the
-files, reads the diagnoses and writes tables and page.
+The machine may be shared: speeds are compared within one round, and the median over the rounds is reported. The fleet's own cost is measured as
+processor time in two ways: entries that fail at once, minus the start of a worker; and a run over a folder that has all results, which
+hashes the files, reads the diagnoses and writes tables and page.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ Settings = dict[str, Any]
 
 @dataclass(frozen=True)
 class Cost:
-    """Wall time and processor time of a run [s], and the entries' own wall time, summed."""
+    """Wall time and processor time of a fleet's run [s], and sum of the wall times of its entries' diagnoses [s]."""
 
     wall_s: float
     cpu_s: float
@@ -33,7 +33,7 @@ class Cost:
 
 
 def scaling(folder: Path, entries: int, pairs: int, settings: Settings) -> str:
-    """Return the table of the rounds."""
+    """Return the table of the rounds' times with one worker and with two."""
     chosen = read_manifest(folder / "manifest.csv")
     sound = [entry for entry in chosen if all(Path(place).is_file() for place in entry.files)][:entries]
     place = folder / "scaling"
@@ -58,7 +58,7 @@ def scaling(folder: Path, entries: int, pairs: int, settings: Settings) -> str:
 
 
 def overhead(folder: Path, failing: int, rounds: int, settings: Settings) -> str:
-    """Return what the fleet costs per entry; the entries of the folder have been diagnosed with these settings."""
+    """Return a text on the fleet's processor time per entry apart from diagnosis; `folder` must hold all results for these settings."""
     entries = read_manifest(folder / "manifest.csv")
     place = folder / "scaling"
     handing, standing = [], []

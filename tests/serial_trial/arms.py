@@ -1,6 +1,6 @@
-"""Serial arms for the trial: placements of joints, rigid links, friction, limits; and their models for MuJoCo.
+"""Serial arms for the trial: placements of joints, rigid links, friction and limits; and the arms as models of MuJoCo.
 
-Joint j turns about, or slides along, an axis through the origin of its frame, which is placed in the frame of the link before.
+Joint j turns about, or slides along, an axis through the origin of its frame, which is placed in the frame of the previous link.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ Array = NDArray[np.float64]
 
 #: Integration step of MuJoCo [s].
 STEP = 5e-4
-#: A joint that slides reaches its Coulomb friction as viscous friction at so many m/s, one that turns at 1 rad/s.
+#: Speed [m/s] of a linear joint at which its viscous friction is in the same range relative to its Coulomb friction as at 1 rad/s on a rotary one.
 _SLIDING_SPEED = 0.2
-#: Lever [m] by which rotors of joints that slide are like those of joints that turn.
+#: Lever arm [m] by which drawn rotor inertias are divided on linear joints, so that they are comparable with those of rotary joints.
 _SPINDLE = 0.35
 
 
 @dataclass(frozen=True)
 class Link:
-    """A rigid body.
+    """Rigid body: one link of an arm.
 
     Attributes
     ----------
@@ -34,7 +34,7 @@ class Link:
     com : ndarray, shape (3,)
         Centre of mass in the link's frame [m].
     spread : ndarray, shape (3, 3)
-        Covariance of the mass about it, ``integral of x x' dm`` [kg m^2]; positive semi-definite for every body that can exist.
+        Second moments of the mass about the centre of mass, ``integral of x x' dm`` [kg m^2]; positive semi-definite for every possible body.
     """
 
     mass: float
@@ -48,13 +48,13 @@ class Link:
 
     @property
     def ten(self) -> Array:
-        """``m, m cx, m cy, m cz, Ixx, Ixy, Iyy, Ixz, Iyz, Izz`` about the link's origin, shape (10,)."""
+        """Ten inertial parameters about the link's origin: ``m, m cx, m cy, m cz, Ixx, Ixy, Iyy, Ixz, Iyz, Izz``, shape (10,)."""
         second = self.spread + self.mass * np.outer(self.com, self.com)
         i = np.trace(second) * np.eye(3) - second
         return np.array([self.mass, *(self.mass * self.com), i[0, 0], i[0, 1], i[1, 1], i[0, 2], i[1, 2], i[2, 2]])
 
     def scaled(self, factor: float) -> Link:
-        """Return a link of the same shape that weighs `factor` times as much."""
+        """Return a link of the same shape and size with `factor` times the mass."""
         return Link(factor * self.mass, self.com, factor * self.spread)
 
     def joined(self, other: Link) -> Link:
@@ -73,23 +73,23 @@ class SerialRobot:
     Attributes
     ----------
     name : str
-        Family it was drawn from.
+        Name of the family that the arm was drawn from.
     kinds : tuple of {"revolute", "prismatic"}
         Kind of each joint.
     rotation : ndarray, shape (n, 3, 3)
-        Axes of each joint's frame in the frame of the link before, as columns.
+        Axes of each joint's frame in the frame of the previous link, as columns.
     translation, axis : ndarray, shape (n, 3)
-        Its origin there [m], and the joint's axis in the joint's frame.
+        Origin of each joint's frame in the frame of the previous link [m], and the joint's axis in its own frame.
     links : tuple of Link
         The links that the joints move.
     rotor, viscous, coulomb : ndarray, shape (n,)
-        Rotor inertias at the joint [kg m^2 or kg] and friction [N m s/rad, N m; N s/m, N].
+        Rotor inertias reflected to the joint [kg m^2 or kg], viscous friction [N m s/rad or N s/m] and Coulomb friction [N m or N].
     gravity : ndarray, shape (3,)
-        In the frame of the base [m/s^2].
+        Acceleration of gravity in the frame of the base [m/s^2].
     lower, upper, speed, effort : ndarray, shape (n,)
-        Range of positions, largest speed and largest torque.
+        Range of positions [rad or m], largest speed [rad/s or m/s] and largest torque [N m or N] of each joint.
     counts : ndarray, shape (n,)
-        Encoder counts per turn or per metre.
+        Encoder counts per turn (rotary joint) or per metre (linear joint).
     """
 
     name: str
@@ -115,22 +115,22 @@ class SerialRobot:
 
     @property
     def rotary(self) -> NDArray[np.bool_]:
-        """Whether each joint turns, shape (n,)."""
+        """Whether each joint is rotary, shape (n,)."""
         return np.array([kind == "revolute" for kind in self.kinds])
 
     @property
     def step(self) -> Array:
-        """Position of one encoder count [rad or m], shape (n,)."""
+        """Encoder step of each joint [rad or m], shape (n,)."""
         return np.where(self.rotary, 2 * np.pi, 1.0) / self.counts
 
     @property
     def theta(self) -> Array:
-        """Ten numbers per link, then rotor inertias, viscous and Coulomb coefficients, shape (13 n,)."""
+        """Parameters: ten inertial parameters per link, then rotor inertias, viscous and Coulomb friction per joint, shape (13 n,)."""
         return np.concatenate([*(link.ten for link in self.links), self.rotor, self.viscous, self.coulomb])
 
     @property
     def lengths(self) -> Array:
-        """Size of each link [m], shape (n,): to the next joint, to the centre of mass or its radius of gyration, at least 5 % of the reach."""
+        """Size of each link [m], shape (n,): largest of distances to next joint and centre of mass, radius of gyration and 5 % of the arm's reach."""
         ahead = np.append(np.linalg.norm(self.translation[1:], axis=1), 0.0)
         com = np.array([np.linalg.norm(link.com) for link in self.links])
         gyration = np.array([np.sqrt(np.trace(link.spread) / link.mass) for link in self.links])
@@ -138,15 +138,15 @@ class SerialRobot:
 
     @property
     def upside_down(self) -> bool:
-        """Whether gravity pulls away from the base: such an arm hangs."""
+        """Whether gravity has a positive z component in the base's frame, as it has for an arm that hangs from a ceiling."""
         return bool(self.gravity[2] > 0)
 
     def with_link(self, k: int, link: Link) -> SerialRobot:
-        """Return the arm with another link `k`, from 0."""
+        """Return the arm with `link` in the place of link `k`, counted from 0."""
         return replace(self, links=(*self.links[:k], link, *self.links[k + 1 :]))
 
     def mjcf(self, *, friction: bool = True) -> str:
-        """Return the arm as a model of MuJoCo; dry friction is sharp, viscous friction is the joints' damping.
+        """Return the arm as MJCF text for MuJoCo; dry friction is not regularised, viscous friction is the joints' damping.
 
         Parameters
         ----------
@@ -177,14 +177,14 @@ class SerialRobot:
 
 
 def turn(axis: Sequence[float] | Array, angle: float) -> Array:
-    """Return the rotation about an axis by an angle [rad], shape (3, 3) (Rodrigues)."""
+    """Return the rotation matrix about an axis by an angle [rad], shape (3, 3) (Rodrigues)."""
     x, y, z = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     return np.asarray(np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross)
 
 
 def rod(mass: float, end: Array, radius: float, at: float, aside: Array) -> Link:
-    """Return a cylinder from the origin to `end` with its centre of mass at a share `at` of the way, moved by `aside` [m]."""
+    """Return a cylinder from the origin to `end` [m], with its centre of mass at the fraction `at` of its length, moved by `aside` [m]."""
     length = float(np.linalg.norm(end))
     along = end / length
     across = np.eye(3) - np.outer(along, along)
@@ -194,10 +194,10 @@ def rod(mass: float, end: Array, radius: float, at: float, aside: Array) -> Link
 
 @dataclass(frozen=True)
 class _Family:
-    """What arms of one make have in common: Denavit-Hartenberg rows or axes, masses, ranges, drives."""
+    """Common values of the arms of one family: Denavit-Hartenberg rows or axes, masses, ranges, drives."""
 
     rows: tuple[tuple[float, float, float, float], ...]
-    """Placement of each joint in the frame before, at its zero: `d` along z, `a` along x, then turned by `alpha` about x and `beta` about y."""
+    """Placement of each joint in the previous frame at position zero: `d` along z, `a` along x, then turned by `alpha` about x and `beta` about y."""
     masses: tuple[float, ...]
     effort: tuple[float, ...]
     middle: tuple[float, ...]
@@ -209,11 +209,11 @@ class _Family:
     speed: float
     counts: int
     kinds: str = ""
-    """``R`` or ``P`` for each joint; all turn if it is empty."""
+    """Letter ``R`` (rotary) or ``P`` (linear) for each joint; all joints are rotary if it is empty."""
 
 
 _Q = np.pi / 2
-#: Rounded from the makers' drawings: UR10 (Universal Robots), Panda (Franka), SO-101 (Hugging Face); masses of the Panda from Gaz et al. 2019.
+#: Families from rounded drawings of the makers: UR10 (Universal Robots), Panda (Franka; masses of Gaz et al. 2019), SO-101 (Hugging Face).
 FAMILIES = {
     "UR10-like": _Family(
         ((0.127, 0.0, 0.0, 0.0), (0.0, 0.0, _Q, 0.0), (0.0, -0.612, 0.0, 0.0), (0.0, -0.572, 0.0, 0.0),
@@ -236,14 +236,14 @@ FAMILIES = {
         (9.0, 6.0, 3.0), (150.0, 300.0, 40.0), (0.0, 0.0, 0.3), 1.3, 0.06, 0.3, 1.6, 2**17, "RPR",
     ),
 }  # fmt: skip
-#: Range of the linear joint [m] and its largest speed [m/s].
+#: Half of the range of a linear joint [m], and its largest speed [m/s].
 _TRAVEL, _SLIDE = 0.22, 0.35
 
 
 def draw_robot(rng: np.random.Generator, family: str | None = None, n: int | None = None) -> SerialRobot:
-    """Draw an arm around one of the `FAMILIES`, with its first `n` joints and links; lengths and masses differ by up to a quarter.
+    """Draw an arm of one of the `FAMILIES`, with its first `n` joints and links; lengths and masses differ by up to a quarter.
 
-    A third of the arms stand on a base that is known to be tilted; some hang from the ceiling; some have joints that are placed askew.
+    A third of the arms have a base with a known tilt; some hang from the ceiling; some have joint axes in slightly random directions.
     """
     family = family or str(rng.choice(list(FAMILIES), p=[0.35, 0.3, 0.2, 0.15]))
     of = FAMILIES[family]
@@ -288,7 +288,7 @@ def draw_robot(rng: np.random.Generator, family: str | None = None, n: int | Non
 def perturbed(
     robot: SerialRobot, rng: np.random.Generator, inertial: float, rotor: float, friction: float
 ) -> SerialRobot:
-    """Return an arm whose values are off by up to these shares of their size; every link remains a body that can exist."""
+    """Return an arm whose values differ at random by up to these shares of their size; every link remains a physically possible body."""
     links = []
     for link, length in zip(robot.links, robot.lengths, strict=True):
         grown = np.diag(1 + 0.3 * inertial * rng.uniform(-1, 1, 3))

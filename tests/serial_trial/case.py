@@ -1,4 +1,4 @@
-"""Cases: an arm, logs of its motion, and a key that says what is hidden; all of it from a seed and a number."""
+"""Cases of the trial: an arm, logs of its motion, and a key that says what is hidden, all drawn from a seed and a number."""
 
 from __future__ import annotations
 
@@ -33,37 +33,37 @@ from .visibility import visibility
 
 Array = NDArray[np.float64]
 
-#: What the arm file states: standard deviations of the inertial values, as shares of mass times powers of the link's length, of rotor inertias
-#: and of friction, as shares of these.
+#: Standard deviations in the arm file by degree of trust: of inertial values, as shares of mass times powers of the link's length; of rotor
+#: inertias and of friction, as shares of their values.
 TRUST = {"published": (0.1, 0.3, 0.5), "trusted": (0.01, 0.05, 0.5)}
-#: The truth is off by less than this many of these standard deviations.
+#: Largest difference of the true from the nominal values, in the arm file's standard deviations.
 OFF = 0.8
-#: Least change of the torque of a joint by a hidden effect, RMS, as a share of that torque.
+#: Smallest RMS change of a joint's torque that a hidden effect must make, as a share of the joint's RMS torque.
 LEAST = 0.03
-#: Disturbances that the log does not show, as shares of the joint's RMS torque.
+#: Standard deviations of torque disturbances that the log does not show, as shares of the joint's RMS torque.
 NOISE = (0.0, 0.01, 0.02)
-#: Draws of a case until one has a motion and an effect of a size that matters.
+#: Largest number of draws for a case, of which the first with a usable motion and a hidden effect of sufficient size is taken.
 _DRAWS = 80
 _LOGS = ("train-1", "train-2", "holdout-1")
 _DURATION_S = 12.0
-#: Numbers of null cases begin here.
+#: Number of the first null case.
 NULLS = 1_000_000
 
 
 @dataclass(frozen=True)
 class Case:
-    """One case.
+    """One case of the trial.
 
     Attributes
     ----------
     arm : armgap.Arm
         Nominal model.
     training, holdout : list of armgap.Log
-        Logs.
+        Training logs and holdout logs.
     key : dict
-        What is hidden: ``effect``, ``joint`` (from 1; None for the whole arm), ``values``, ``outside`` (whether armgap's library has no such
-        effect), ``change`` (RMS of the joint's torque with and without it, as a share), ``above_floor``, ``moved`` and ``visible``
-        (`visibility.Visibility`; not of null cases, nor of logs of references); and how the case was made.
+        What is hidden: ``effect``, ``joint`` (from 1; None for the whole arm), ``values``, ``outside`` (whether armgap's library lacks the
+        effect), ``change`` (RMS change of the joint's torque by the effect, as a share of that torque), ``above_floor``, ``moved`` and
+        ``visible`` (see `visibility.Visibility`; neither in null cases nor for logs of references); and how the case was made.
     """
 
     arm: armgap.Arm
@@ -73,14 +73,14 @@ class Case:
 
 
 def effect_of(seed: int, number: int, *, commanded: bool = False) -> str:
-    """Return the effect of a case: every effect comes once in as many cases as there are effects, in an order of the seed's."""
+    """Return the name of a case's effect: among as many consecutive cases as there are effects, each has another, in an order by the seed."""
     effects = list(COMMANDED if commanded else EFFECTS)
     turn, place = divmod(number, len(effects))
     return effects[int(np.random.default_rng([seed, turn, 7]).permutation(len(effects))[place])]
 
 
 def sigma_of(robot: SerialRobot, trust: str) -> Array:
-    """Return the standard deviations that the arm file states, shape (13 n,)."""
+    """Return the standard deviations of the arm file's values for a degree of trust, shape (13 n,)."""
     inertial, rotor, friction = TRUST[trust]
     powers = np.array([0, 1, 1, 1, 2, 2, 2, 2, 2, 2])
     links = [inertial * link.mass * size**powers for link, size in zip(robot.links, robot.lengths, strict=True)]
@@ -88,7 +88,7 @@ def sigma_of(robot: SerialRobot, trust: str) -> Array:
 
 
 def arm_of(robot: SerialRobot, period: float, trust: str, by: Controller | None = None) -> armgap.Arm:
-    """Return an arm as armgap takes it, with its position controller where the logs hold references."""
+    """Return a simulated arm as an `armgap.Arm`, with the position controller `by` where the logs hold references."""
     chain = SerialChain(
         tuple(f"joint{j + 1}" for j in range(robot.n)), tuple(f"link{j + 1}" for j in range(robot.n)),
         robot.kinds, robot.rotation, robot.translation, robot.axis, robot.gravity, robot.lower, robot.upper,
@@ -123,22 +123,22 @@ def make_case(
     Parameters
     ----------
     seed, number : int
-        They decide everything; null cases have numbers from `NULLS`.
+        Seed of the trial and number of the case, which decide everything; null cases have numbers from `NULLS`.
     effect : str or type of Effect, optional
-        The hidden effect or its name, ``"null"`` for none; by default that of the number.
+        The hidden effect or its name, ``"null"`` for none; by default the effect of the case's number.
     family : str, optional
         Family of the arm; drawn by default.
     joints : int, optional
-        Number of joints, of those that the family has; drawn by default.
+        Number of joints, at most that of the family; drawn by default.
     duration : float, default 12
-        Of each log [s].
+        Duration of each log [s].
     commanded : bool, default False
-        Whether servos follow references, and the logs hold these in place of torques.
+        Whether the arm's servos follow references, and the logs hold the references in place of torques.
 
     Raises
     ------
     RuntimeError
-        If no draw has a motion and an effect that makes a difference.
+        If no draw has a usable motion and an effect of sufficient size.
     """
     name = effect or ("null" if number >= NULLS else effect_of(seed, number, commanded=commanded))
     kind = COMMANDED.get(name, Null) if isinstance(name, str) else name
@@ -230,13 +230,13 @@ def _draw(
 
 
 def _change(without: Run, with_it: Run) -> Array:
-    """RMS by which the torques of two runs of one reference differ, as a share of the torque, shape (n,)."""
+    """Return the RMS difference of the torques of two runs with one reference, as a share of the RMS torque `with_it`, shape (n,)."""
     differ = np.sqrt(np.mean((with_it.tau - without.tau) ** 2, axis=0))
     return np.asarray(differ / np.sqrt(np.mean(with_it.tau**2, axis=0)))
 
 
 def hidden_effect(key: dict[str, Any]) -> Effect:
-    """Return the effect that a key describes."""
+    """Return the hidden effect that the key of a case describes."""
     joint = None if key["joint"] is None else key["joint"] - 1
     values = {k: np.array(v) if isinstance(v, list) else v for k, v in key["values"].items()}
     return COMMANDED.get(key["effect"], Null)(joint, **values)
