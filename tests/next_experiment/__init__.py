@@ -1,1 +1,1 @@
-"""The next experiment, checked in another simulator: what a plan promises beside what its motion, played in MuJoCo, lets a diagnosis say."""
+"""Trial of planned motions: evidence that a plan expects, and what a diagnosis names after its motion was simulated in MuJoCo."""

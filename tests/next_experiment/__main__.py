@@ -1,4 +1,4 @@
-"""Plan, play and diagnose cases with a hidden effect: ``python -m tests.next_experiment --help``."""
+"""Plan motions for cases with a hidden effect, play them in MuJoCo, diagnose the logs: ``python -m tests.next_experiment --help``."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from .obtained import obtained
 from .sealed import draw
 from .summary import is_settled, summary
 
-#: What a diagnosis says of look-alikes that are not the same whatever the motion.
+#: Text in a diagnosis about an equivalent that other motions may distinguish from the named effect.
 SEPARABLE = "other motions may separate them"
 
 
 def named(diagnosis: armgap.Diagnosis, case: Case) -> tuple[str, float]:
-    """What became of the hidden effect: named alone, named with look-alikes, a candidate, or not named; and its probability.
+    """Return what a diagnosis says of the hidden effect (named alone, named with look-alikes, candidate, or a status) and its probability.
 
-    What is the same whatever the motion is no look-alike: each may be named, and no experiment settles which it is.
+    Equivalents that no motion can distinguish do not count as look-alikes: each of them may be named, as no experiment decides between them.
     """
     hidden = (case.effect, case.joint)
     for cause in diagnosis.causes:
@@ -45,9 +45,9 @@ def named(diagnosis: armgap.Diagnosis, case: Case) -> tuple[str, float]:
 
 
 def one(case: Case, seed: int, duration: float, ask: bool) -> dict[str, Any] | None:
-    """Poor log, diagnosis, plan, both motions played, both diagnosed.
+    """Diagnose a case from its small first motion, plan a motion, play plan and multisine, diagnose both; return the results as a record.
 
-    None where the first log of a sealed case settles it, or where the arm does not follow even that motion: its controller is not stable.
+    Return None where the first log of a sealed case already names the hidden effect, or the arm cannot follow its motion (unstable control).
     """
     with tempfile.TemporaryDirectory() as name:
         arm, arm_file = write_arm(case, seed, Path(name))
@@ -77,7 +77,7 @@ def one(case: Case, seed: int, duration: float, ask: bool) -> dict[str, Any] | N
             ends = np.abs(np.concatenate([planned.dq[[0, -1]], planned.q[[0]] - planned.q[[-1]]]))
             result["rest"] = float(ends.max())
         for key, reference in (("planned", planned), ("multisine", usual)):
-            with suppress(ValueError, KeyError):  # what the library has no values for, or cannot simulate
+            with suppress(ValueError, KeyError):  # effects that the library has no values for, or cannot simulate
                 result[f"{key} expected"] = expected(case, before, arm_file, reference, open_plan.threshold)
             trace = play(case, arm, reference)
             result[f"{key} obtained"] = obtained(case.effect, arm_file, arm, trace, before.gap.horizon_s)

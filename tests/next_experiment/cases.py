@@ -1,4 +1,4 @@
-"""Arms with a hidden effect, a poor first log, and motions played in MuJoCo under a PD controller."""
+"""Arms with a hidden effect, a small first motion, and motions played in MuJoCo under a PD controller."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ from armgap.trial.simulation.simulated_arm import CommandSource, Trace, run
 
 Array = NDArray[np.float64]
 
-#: Bandwidth of the controllers, rad/s.
+#: Bandwidth of the PD controllers, rad/s.
 BANDWIDTH = 14.0
-#: Length of the poor log, s; part of the range it covers; its frequencies, Hz.
+#: Duration of the small first motion, s; share of the range of positions that it covers; its frequencies, Hz.
 POOR_S, POOR_PART, POOR_HZ = 4.0, 0.08, (0.3, 0.5)
-#: Harmonics of the standard multisine, and its base frequency, Hz.
+#: Number of harmonics of the standard multisine, and its base frequency, Hz.
 HARMONICS, BASE_HZ = 5, 0.2
 REST = 0.2
 
@@ -39,9 +39,9 @@ LIMITS = {
     "pendulum": ((-2.0,), (2.0,), (6.0,), (60.0,)),
     "axis": ((-0.45,), (0.45,), (0.8,), (8.0,)),
 }
-#: The motor's part of joint 2's inertia in the simulator.
+#: Share of the rotor in the inertia of joint 2 of the geared arm in the simulator.
 ROTOR_SHARE = BACKLASH_ROTOR * GEARED.inertia[1] / GEARED.joint_inertia[1]
-#: Coarse encoders: with fine ones the poor log tells everything.
+#: Encoder steps, rad and m: coarse, because with fine ones the small first motion would already determine the effects.
 STEP, LINEAR_STEP = TURN / 20_000, 2e-5
 ARMS = {
     "direct-drive": replace(DIRECT_DRIVE, step=(STEP, STEP)),
@@ -53,7 +53,7 @@ ARMS = {
 
 @dataclass(frozen=True)
 class Case:
-    """A hidden effect on an arm."""
+    """Arm, hidden effect with its joint and parameters, and the true arm if it was drawn at random."""
 
     arm: str
     effect: str
@@ -87,14 +87,14 @@ CASES = (
 
 @dataclass(frozen=True)
 class Reference:
-    """Samples of a motion with its feed-forward torque."""
+    """Reference of a motion: positions, velocities and feed-forward torques at the samples, shape (n_samples, n_joints) each."""
 
     q: Array
     dq: Array
     tau: Array
 
     def source(self, arm: TrialArm) -> CommandSource:
-        """A controller that follows it: PD on measured positions, and the feed-forward."""
+        """Return a PD controller on measured positions that follows the reference, with its feed-forward torque."""
         inertia = np.array(arm.joint_inertia)
         kp, kd = inertia * BANDWIDTH**2, 1.4 * inertia * BANDWIDTH
         limit = np.array(arm.torque_limit)
@@ -113,7 +113,7 @@ class Reference:
 
 @dataclass(frozen=True)
 class Sampled:
-    """A reference as what evidence is computed for: it may be evaluated between its samples."""
+    """Reference as a motion that the computation of evidence takes: values between the samples are interpolated."""
 
     t: Array
     reference: Reference
@@ -123,7 +123,7 @@ class Sampled:
         return float(self.t[-1])
 
     def at(self, t: Array) -> tuple[Array, Array, Array]:
-        """Positions, velocities and accelerations at some times."""
+        """Return positions, velocities and accelerations at the times `t` [s], shape (n_times, n_joints) each."""
         r = self.reference
         every = (r.q, r.dq, np.gradient(r.dq, self.t, axis=0))
         found = [np.column_stack([np.interp(t, self.t, x[:, j]) for j in range(x.shape[1])]) for x in every]
@@ -133,7 +133,7 @@ class Sampled:
 def expected(
     case: Case, before: armgap.Diagnosis, arm_file: Path, reference: Reference, threshold: float
 ) -> tuple[float, float]:
-    """Expected log-likelihood ratio and probability of a decision at the hidden effect's own size, against its absence."""
+    """Return the expected log-likelihood ratio of the hidden effect, at its true size, to its absence, and the probability of a decision."""
     arm = armgap.Arm.read(arm_file)
     model, _ = known_model(before.to_dict(), arm)
     t = arm.sample_period * np.arange(len(reference.q))
@@ -145,13 +145,13 @@ def expected(
 
 
 def limits_toml(model: str) -> str:
-    """The limits of an arm as a table of an arm file."""
+    """Return the motion limits of an arm model as a table of an arm file."""
     keys = ("position_min", "position_max", "speed", "acceleration")
     return "\n[limits]\n" + "".join(f"{k} = {list(v)}\n" for k, v in zip(keys, LIMITS[model], strict=True))
 
 
 def write_arm(case: Case, seed: int, folder: Path) -> tuple[TrialArm, Path]:
-    """The true arm, and an arm file whose values are off by draws from their standard deviations."""
+    """Return the true arm, and the path of an arm file with values that differ from it by random draws from their standard deviations."""
     arm = case.machine or ARMS[case.arm]
     nominal = draw_nominal(np.random.default_rng([seed, 7]), arm, exact=False)
     text = arm_toml(arm, nominal, case.name, "0" * 64) + limits_toml(case.arm)
@@ -161,14 +161,14 @@ def write_arm(case: Case, seed: int, folder: Path) -> tuple[TrialArm, Path]:
 
 
 def play(case: Case, arm: TrialArm, reference: Reference, *, hidden: bool = True) -> Trace:
-    """Play a reference on the arm, with the hidden effect or without."""
+    """Simulate the arm under the controller that follows a reference, with the hidden effect or without it."""
     effects = [HiddenEffect(case.effect, case.joint, case.parameters, None, "library")] if hidden else []
     duration = (len(reference.q) - 1) * arm.sample_period
     return run(simulated_arm_of(arm, effects, "log"), reference.source(arm), duration)
 
 
 def poor(arm: TrialArm, model: str) -> Reference:
-    """A small, slow and short motion: two sines per joint."""
+    """Return the small, slow and short first motion: two sines per joint."""
     low, high = (np.array(x) for x in LIMITS[model][:2])
     t = arm.sample_period * np.arange(round(POOR_S / arm.sample_period) + 1)
     size = 0.5 * POOR_PART * (high - low)
@@ -182,7 +182,7 @@ def poor(arm: TrialArm, model: str) -> Reference:
 
 
 def multisine(arm_file: Path, model: str, duration: float, seed: int) -> Reference:
-    """A random Fourier series of five harmonics, as large as the limits let it be."""
+    """Return a random multisine of :data:`HARMONICS` harmonics, as large as the arm file's limits allow."""
     arm = armgap.Arm.read(arm_file)
     assert arm.limits is not None
     limits: MotionLimits = arm.limits
@@ -210,5 +210,5 @@ def multisine(arm_file: Path, model: str, duration: float, seed: int) -> Referen
 
 
 def log_of(trace: Trace, name: str) -> armgap.Log:
-    """What a log of the played motion shows."""
+    """Return the log of a played motion: measured positions and torques without velocities."""
     return armgap.Log(name, trace.t, trace.q, trace.tau, None)

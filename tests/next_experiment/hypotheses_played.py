@@ -1,6 +1,6 @@
-"""A planned motion played on arms that have each of the effects in question in turn: what it takes of the limits.
+"""A planned motion played on arms with each effect of the open questions in turn: largest shares of the limits that are used.
 
-The effects' values are the trial generator's, not the planner's: drawn for the planned motion, and no larger than the planner thinks possible.
+The values of the effects are drawn by the trial's generator for the planned motion, but are no larger than the planner considers possible.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from armgap.trial.simulation.simulated_arm import Trace
 
 from .cases import LIMITS, Case, Reference, play, poor
 
-#: Part of a range by which a played motion may exceed it.
+#: Largest share of a range of position or speed by which a played motion may exceed it.
 EXCESS = 0.02
 
 
 def used(trace: Trace, model: str, limit: tuple[float, ...]) -> dict[str, float]:
-    """Largest part of each limit that the played motion took."""
+    """Return the largest share of the position, speed and torque limits that a played motion uses; 1 is at the limit."""
     low, high, speed, _ = (np.array(x) for x in LIMITS[model])
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
     return {
@@ -34,12 +34,12 @@ def used(trace: Trace, model: str, limit: tuple[float, ...]) -> dict[str, float]
 
 
 def is_followed(part: dict[str, float]) -> bool:
-    """Whether a motion was played within the limits of position and speed."""
+    """Return whether a played motion stayed within its limits of position and speed, up to :data:`EXCESS`; `part` are shares of limits."""
     return max(part["position"], part["speed"]) <= 1.0 + EXCESS
 
 
 def hypotheses(plan: armgap.Plan) -> list[tuple[str, int | None, tuple[str, float] | None]]:
-    """Every effect that a plan's questions are about, with the largest value thought possible of a parameter where one is known."""
+    """Return every effect in a plan's open questions, its joint, and, if known, a parameter with its largest possible value."""
     found: dict[tuple[str, int | None], tuple[str, float] | None] = {}
     for q in plan.questions:
         found[q.effect, q.joint] = None if q.sizes is None else (q.sizes[0], max(np.abs(q.sizes[1:])))
@@ -49,9 +49,9 @@ def hypotheses(plan: armgap.Plan) -> list[tuple[str, int | None, tuple[str, floa
 
 
 def played(case: Case, arm: TrialArm, plan: armgap.Plan, seed: int) -> Iterator[dict[str, object]]:
-    """Play the planned motion with every open hypothesis in the arm, the hidden effect in its own turn.
+    """Play the planned motion on arms with each effect of the open questions in turn; yield the effect, its values and shares of limits used.
 
-    An arm that would not even have followed the first, small motion is no hypothesis: the first log would look otherwise.
+    An effect with which the arm could not follow the first, small motion is left out: the first log would have looked different.
     """
     reference = Reference(plan.q_ref, plan.dq_ref, plan.tau_ff)
     bare = play(case, arm, reference, hidden=False)

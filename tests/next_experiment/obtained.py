@@ -1,7 +1,7 @@
-"""Evidence that a played motion gave: the log-likelihood ratio of the truth against the arm without the effect, all its values fitted.
+"""Evidence that a played motion gave: log-likelihood ratio of the true arm to the arm without the effect, with all of its values fitted.
 
-The truth is known here: what it leaves is the encoder's noise. The arm without the effect is fitted by scipy to windows from their true first
-states, under the arm file's standard deviations; constants and slopes, which an error of the first state would make, do not count.
+The residual of the true arm is known here: the encoder's noise. The arm without the effect is fitted by scipy to windows from their true first
+states, with the arm file's standard deviations as prior; constants and slopes, like those of an error of the first state, are left out.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from armgap.trial.simulation.simulated_arm import Trace
 
 Array = NDArray[np.float64]
 
-#: Degrees of the polynomials by which a window's positions count.
+#: Largest degree of the Legendre polynomials onto which the residuals of a window are projected.
 DEGREES = 12
-#: Steps of the fit at most.
+#: Largest number of function evaluations of the fit.
 STEPS = 12
-#: Effects that no true position shows.
+#: Effects of the encoder, which change measured but not true positions.
 MEASURED = ("encoder_offset", "encoder_eccentricity")
 
 
 def obtained(effect: str, arm_file: Path, arm: TrialArm, trace: Trace, horizon: float) -> float:
-    """Return the log-likelihood ratio of the truth against the best arm without the effect."""
+    """Return the log-likelihood ratio of the true arm to the best fitting arm without the effect, over windows of length `horizon` [s]."""
     stated = armgap.Arm.read(arm_file)
     s = max(round(horizon / arm.sample_period), DEGREES + 2)
     windows = (len(trace.t) - 1) // s

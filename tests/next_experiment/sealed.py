@@ -1,4 +1,4 @@
-"""Cases drawn at random: machine, arm, effect, joint and size follow from a seed, and nothing of them is looked at before the scores."""
+"""Cases drawn at random: arm model, arm, effect, joint and size follow from a seed, and are not looked at before the scores."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from armgap.trial.simulation.arms import random_arm
 
 from .cases import ARMS, Case, multisine, play, write_arm
 
-#: Length of the motion that sizes are stated against, s.
+#: Duration of the large motion by which the sizes of effects are drawn, s.
 STATED_S = 10.0
 
 
 def draw(seed: int, number: int) -> Case | None:
-    """Draw a case: an arm around one of the machines, with one of its effects; none where the draw has no size.
+    """Draw a case: a random arm of one of the arm models with one effect; return None where no size of the effect can be drawn.
 
-    Sizes are stated against a large motion, so most of them hardly show in a small one.
+    Sizes are drawn for a large motion, so most effects are hardly visible in a small one.
     """
     rng = np.random.default_rng([seed, number])
     model = sorted(ARMS)[int(rng.integers(len(ARMS)))]

@@ -1,4 +1,4 @@
-"""What sealed cases come to: how many questions each motion settled, and how what was promised compares with what was seen."""
+"""Summary of sealed cases: number of questions that each motion settled, and expected against obtained evidence."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from scipy.stats import binomtest, spearmanr
 
 from .hypotheses_played import EXCESS, is_followed
 
-#: Promise that counts as one.
+#: Probability of a decision from which a plan counts as promising one.
 PROMISED = 0.95
-#: Probability from which a name without look-alikes settles a question.
+#: Probability of the hidden effect from which a diagnosis that names it without look-alikes settles the question.
 SETTLED = 0.5
 
 
 def is_settled(found: tuple[str, float]) -> bool:
-    """Whether a final diagnosis names the hidden effect without look-alikes."""
+    """Return whether a diagnosis names the hidden effect without look-alikes, with a probability of :data:`SETTLED` or more."""
     return found[0] == "named" and found[1] >= SETTLED
 
 
 def summary(records: list[dict[str, Any]]) -> str:
-    """Return the counts, the paired test and the rank correlations."""
+    """Return counts of settled questions, a paired test of plan against multisine, and rank correlations of evidence, as text."""
     sound = [r for r in records if "error" not in r]
     plan, usual = (np.array([is_settled(r[k]) for r in sound]) for k in ("planned", "multisine"))
     gained, lost = int(np.sum(plan & ~usual)), int(np.sum(usual & ~plan))

@@ -1,4 +1,4 @@
-"""Make cases, ask the diagnosis, print how it did: ``python -m tests.second_simulator --help``."""
+"""Make cases, diagnose them, print how often answers are right: ``python -m tests.second_simulator --help``."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ THREADS = ("RAYON_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "POLA
 
 
 def main() -> None:
-    """Read the options and do it."""
+    """Read the options and run the requested step: make cases, diagnose them, or score the answers."""
     parser = argparse.ArgumentParser(prog="python -m tests.second_simulator", description=__doc__)
     commands = parser.add_subparsers(dest="command", required=True)
     make = commands.add_parser("make", help="make cases")
@@ -59,7 +59,7 @@ def _make(options: argparse.Namespace) -> None:
 
 
 def answer(folder: Path, horizon: float) -> dict[str, Any]:
-    """Diagnose one case."""
+    """Diagnose the case of a folder, with windows of `horizon` seconds, and return the record of the answer."""
     import armgap
     from armgap.check.contradiction import Refit
 
@@ -111,7 +111,7 @@ def _ask(options: argparse.Namespace) -> None:
         for folder, task in tasks:
             try:
                 record = task.result()
-            except Exception as error:  # one case that fails must not end the run; it is counted
+            except Exception as error:  # an error in one case must not end the run; the case is counted as failed
                 record = {"case": folder.name, "failed": f"{type(error).__name__}: {error}"}
             out.write(json.dumps(record) + "\n")
             out.flush()

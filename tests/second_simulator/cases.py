@@ -1,4 +1,4 @@
-"""Cases: an arm, its motions, what is hidden in it, and the files of it."""
+"""Cases of the second simulator: arm, motions, hidden effects, and the files of a case."""
 
 from __future__ import annotations
 
@@ -15,13 +15,14 @@ from .dynamics import STEP, simulate, table
 
 Array = np.ndarray
 TURN = 2.0 * math.pi
-#: Mass [kg], length, centre [m], inertia [kg m^2] of both links; viscous, Coulomb friction; largest torque; encoder counts.
+#: Values of both links or joints: mass [kg], length, centre of mass [m], inertia [kg m^2]; viscous [N m s/rad] and Coulomb friction [N m]; largest
+#: torque [N m]; and encoder counts per turn.
 DESIGNS = {
     "large": ((14.0, 5.0), (0.42, 0.33), (0.17, 0.12), (0.45, 0.09), (1.6, 0.25), (4.5, 1.1), (150.0, 30.0), 262144),
     "small": ((0.7, 0.6), (0.22, 0.28), (0.16, 0.21), (0.010, 0.008), (0.02, 0.012), (0.12, 0.09), (9.0, 6.0), 65536),
 }
 PERIODS = (0.001, 0.002, 0.0025, 0.004)
-#: Trust that the arm file states: relative sigma of inertial values and of friction.
+#: Relative standard deviations in the arm file: of inertial values, and of friction.
 TRUST = (0.05, 0.20)
 JOINT_EFFECTS = (
     "torque_offset", "torque_gain", "actuator_lag", "actuator_delay", "torque_saturation", "torque_dead_zone", "torque_ripple",
@@ -31,12 +32,12 @@ JOINT_EFFECTS = (
 HIDDEN_STATES = ("joint_elasticity", "backlash")
 ARM_EFFECTS = ("base_tilt", "payload")
 OUTSIDE = ("cross_position", "drift", "product", "random_torque")
-#: What clutter is made of: small everywhere.
+#: Effects that are added at a small size to the hidden one in the family "clutter", and act alone in "clutter-only".
 SMALL = (
     "torque_offset", "torque_gain", "torque_ripple", "coulomb_asymmetry", "viscous_asymmetry", "stribeck", "quadratic_drag",
     "load_dependent_friction", "position_dependent_friction", "friction_warmup", "joint_spring", "rotor_inertia", "gear_efficiency",
 )  # fmt: skip
-#: What no motion, or hardly any, tells from each other is not put beside each other.
+#: Groups of effects that no motion, or hardly any, can distinguish; two of one group are not put on the same joint.
 ALIKE = (
     {"torque_offset", "coulomb_asymmetry", "encoder_offset", "base_tilt"},
     {"torque_gain", "gear_efficiency"},
@@ -47,16 +48,16 @@ ALIKE = (
 FAMILIES = (
     "single", "pair", "clutter", "clutter-only", "hidden-state", "null", "rounding", "presliding", "parameters", "outside",
 )  # fmt: skip
-#: Widths [rad/s] over which the sign of dry friction is rounded, the same on both joints, and in the family "rounding" another on each.
+#: Smallest and largest width [rad/s] over which the sign of dry friction is smoothed, equal on both joints; WIDE in "rounding", per joint.
 WIDTHS = (1e-3, 8e-3)
 WIDE = (1e-3, 5e-2)
-#: Standard deviations [rad] of a joint's encoder zero between recordings, in the families "zeros" and "zeros-null".
+#: Smallest and largest standard deviation [rad] of a joint's encoder zero between recordings, in the families "zeros" and "zeros-null".
 ZEROS = (2e-3, 4e-2)
 
 
 @dataclass
 class Machine:
-    """One arm, whole."""
+    """Simulated two-link arm with its drives, encoders, friction and hidden effects."""
 
     design: str
     arm: Array
@@ -75,7 +76,7 @@ class Machine:
 
     @property
     def theta(self) -> Array:
-        """Base parameters of Reyes and Kelly (1997), section 5, and friction; a rotor rides in its link's inertia."""
+        """Base parameters of Reyes and Kelly (1997), section 5, then viscous and Coulomb friction; a rotor's inertia is added to its link's."""
         m1, m2, l1, c1, c2, i1, i2, g = self.arm
         third = m2 * c2**2 + i2 + self.rotor[1]
         first = m1 * c1**2 + m2 * l1**2 + i1 + third + self.rotor[0]
@@ -84,7 +85,7 @@ class Machine:
 
     @property
     def inertia(self) -> Array:
-        """Diagonal of the inertia matrix of the stretched arm."""
+        """Diagonal of the inertia matrix of the stretched arm [kg m^2]."""
         return np.array([self.theta[0] + 2.0 * self.theta[1], self.theta[2]])
 
 
@@ -93,7 +94,7 @@ def _log_uniform(rng: np.random.Generator, ends: tuple[float, float]) -> float:
 
 
 def draw_machine(rng: np.random.Generator) -> Machine:
-    """An arm around one of the designs."""
+    """Draw an arm with random deviations from one of the designs."""
     design = str(rng.choice(list(DESIGNS)))
     mass, length, com, inertia, viscous, coulomb, limit, counts = DESIGNS[design]
 
@@ -110,7 +111,7 @@ def draw_machine(rng: np.random.Generator) -> Machine:
 
 
 def draw_reference(rng: np.random.Generator, machine: Machine, duration: float) -> Array:
-    """A multisine that a PD controller follows; feed-forward of the weight, or none."""
+    """Return a multisine reference with gains of a PD controller, with gravity as feed-forward or none, shape (n_samples, 2, 6)."""
     n = round(duration / machine.period)
     t = machine.period * np.arange(n)
     out = np.zeros((n, 2, 6))
@@ -138,7 +139,7 @@ def draw_reference(rng: np.random.Generator, machine: Machine, duration: float) 
 
 @dataclass(frozen=True)
 class Run:
-    """One log and its truth."""
+    """One simulated log: measured positions and commanded torques, with true positions and velocities."""
 
     t: Array
     q: Array
@@ -148,7 +149,7 @@ class Run:
 
 
 def run(machine: Machine, reference: Array, seed: int, zero: Array, pushes: Array | None = None) -> Run:
-    """Simulate one log; the same seed makes the same noise."""
+    """Simulate one log; `seed` decides its noise and random torque, `zero` is the encoder zero per joint [rad]."""
     rng = np.random.default_rng(seed)
     n = len(reference)
     disturbance = np.zeros((n, 4))
@@ -174,7 +175,7 @@ def run(machine: Machine, reference: Array, seed: int, zero: Array, pushes: Arra
 
 @dataclass(frozen=True)
 class Use:
-    """How a joint is used: RMS torque and largest, RMS acceleration, speed, range of positions; sizes are stated against these."""
+    """Statistics of a joint's motion by which sizes of effects are chosen: RMS and largest torque, RMS acceleration, speed, range of positions."""
 
     torque: float
     peak: float
@@ -186,7 +187,7 @@ class Use:
 
 
 def use_of(runs: list[Run], j: int) -> Use:
-    """Use of one joint in all logs."""
+    """Return the statistics of the motion of joint `j`, from 0, over all logs."""
     tau = np.concatenate([r.tau[:, j] for r in runs])
     dq = [r.true_dq[:, j] for r in runs]
     ddq = np.concatenate([np.gradient(d, r.t[1]) for d, r in zip(dq, runs, strict=True)])
@@ -200,7 +201,7 @@ def use_of(runs: list[Run], j: int) -> Use:
 
 
 def hide(machine: Machine, name: str, j: int, share: float, use: Use, rng: np.random.Generator) -> dict[str, float]:
-    """Put an effect into a machine that makes about `share` of the joint's RMS torque; return its values."""
+    """Put an effect of about `share` of the joint's RMS torque into a machine; return the values of its parameters."""
     p, torque = machine.joints[j], share * use.torque
     sign = float(rng.choice([-1.0, 1.0]))
     load = abs(machine.theta[3 + j]) * 0.5
@@ -290,7 +291,7 @@ def hide(machine: Machine, name: str, j: int, share: float, use: Use, rng: np.ra
 def hide_transmission(
     machine: Machine, name: str, j: int, size: float, use: Use, rng: np.random.Generator
 ) -> dict[str, float]:
-    """Put a shaft or play between motor and link; sides of encoder and friction are drawn, the same on both joints."""
+    """Put joint elasticity or backlash between motor and link; the sides of encoder and friction are drawn, and are the same on both joints."""
     p = machine.joints[j]
     rotor = (
         machine.inertia[j] * float(np.exp(rng.uniform(math.log(0.05), math.log(0.25))))
@@ -315,7 +316,7 @@ def hide_transmission(
 
 
 def requests(families: tuple[str, ...]) -> list[tuple[str, int | None]]:
-    """All effects and joints."""
+    """Return pairs of each of the given effects and a joint (1 or 2; None for an effect of the whole arm)."""
     return [(name, j) for name in families for j in ((1, 2) if name not in ARM_EFFECTS else (None,))]
 
 
@@ -333,7 +334,7 @@ def _beside(rng: np.random.Generator, main: str | None) -> list[tuple[str, int |
 
 
 def make(seed: tuple[int, int], family: str, folder: Path, duration: float = 10.0) -> dict[str, Any]:
-    """Make one case on disk; returns its key."""
+    """Make the files of one case in a folder; return its key."""
     for attempt in range(20):
         key = _make(np.random.default_rng([*seed, attempt]), family, folder, duration)
         if key is not None:
@@ -419,7 +420,7 @@ def _make(rng: np.random.Generator, family: str, folder: Path, duration: float) 
 
 
 def _draw_mains(rng: np.random.Generator, family: str) -> list[tuple[str, int | None]]:
-    """What a case hides: two effects that motion tells apart in a pair, one or none otherwise."""
+    """Draw the hidden effects of a case, with joints: two that motion can distinguish in the family "pair", one or none otherwise."""
     known = requests(JOINT_EFFECTS) + requests(ARM_EFFECTS)
     offered = {
         "single": known,

@@ -1,7 +1,7 @@
 """The equations of motion and their integration (fixed-step Runge-Kutta of 50 us, compiled by numba).
 
-Coordinates: link angles ``q1`` (from hanging down) and ``q2`` (relative to link 1), and motor angles ``m1``, ``m2`` beside them, in the
-joints' units. Without elasticity and play a motor is its link. The rotor of joint 2 rides on link 1: its kinetic energy is
+Coordinates: link angles ``q1`` (from hanging down) and ``q2`` (relative to link 1), and motor angles ``m1``, ``m2`` divided by the gear
+ratio. Without elasticity and backlash a motor moves with its link. The rotor of joint 2 is carried by link 1: its kinetic energy is
 ``J2 (dq1 + dm2)^2 / 2``, so its torque balance reacts on joint 1.
 """
 
@@ -12,7 +12,7 @@ import numpy as np
 
 #: Integration step [s].
 STEP = 5e-5
-#: Columns of the table of one joint's values; see `table`.
+#: Names of the parameters of one joint, in the order of the columns that `table` returns.
 NAMES = (
     "viscous", "coulomb", "width", "offset", "gain", "lag", "late", "saturation", "dead_zone", "ripple", "ripple_n", "ripple_phase",
     "asymmetry", "viscous_asymmetry", "stribeck", "stribeck_velocity", "quadratic", "load", "cos_friction", "sin_friction",
@@ -31,7 +31,7 @@ COLUMN = {name: i for i, name in enumerate(NAMES)}
 
 
 def table(joints: list[dict[str, float]]) -> np.ndarray:
-    """Values of both joints as the compiled code takes them; what is not given is neutral."""
+    """Return the parameters of both joints as a table for the compiled code, (2, n_names); parameters that are not given have no effect."""
     values = np.zeros((2, len(NAMES)))
     values[:, GAIN], values[:, SATURATION], values[:, STOP] = 1.0, np.inf, np.inf
     values[:, STRIBECK_VELOCITY] = values[:, WARM_TIME] = values[:, BRISTLE_PATH] = 1.0
@@ -43,7 +43,7 @@ def table(joints: list[dict[str, float]]) -> np.ndarray:
 
 @numba.njit(fastmath=False)
 def friction(p, q, dq, load, t):
-    """Friction torque of one joint at a speed, without that of its bristles."""
+    """Return the friction torque of one joint at velocity `dq` [N m], without the torque of its bristles."""
     shape = dq / np.hypot(dq, p[WIDTH]) if p[ALGEBRAIC] > 0.5 else np.tanh(dq / p[WIDTH])
     level = p[COULOMB] + p[STRIBECK] * np.exp(-((dq / p[STRIBECK_VELOCITY]) ** 2)) + p[LOAD] * abs(load)
     level += p[COS_FRICTION] * np.cos(q) + p[SIN_FRICTION] * np.sin(q)
@@ -54,7 +54,7 @@ def friction(p, q, dq, load, t):
 
 @numba.njit(fastmath=False)
 def drive(p, command):
-    """Torque of a drive in the steady state."""
+    """Return the torque that a drive delivers for a constant command [N m]: gain, dead zone and saturation."""
     u = p[GAIN] * command
     if p[DEAD_ZONE] > 0.0:
         u = np.sign(u) * max(abs(u) - p[DEAD_ZONE], 0.0)
@@ -63,9 +63,9 @@ def drive(p, command):
 
 @numba.njit(fastmath=False)
 def slope(arm, tilt, payload, P, x, u, disturbance, t):
-    """Time derivative of the state ``[q1, q2, m1, m2, dq1, dq2, dm1, dm2, z1, z2]`` under drive torques `u`.
+    """Return the time derivative of the state ``[q1, q2, m1, m2, dq1, dq2, dm1, dm2, z1, z2]`` under drive torques `u`.
 
-    Bristles between links are deflected by `z` of their largest deflection (LuGre without damping of its own).
+    The bristles of a friction contact have the deflection `z`, relative to their largest (LuGre model without bristle damping).
     """
     m1, m2, l1, c1, c2, i1, i2, g = arm
     mp, lp = payload
@@ -134,7 +134,7 @@ def slope(arm, tilt, payload, P, x, u, disturbance, t):
 
 @numba.njit(fastmath=False)
 def simulate(arm, tilt, payload, P, encoder, reference, period, steps, disturbances, pushes):
-    """Run from rest at the first reference.
+    """Simulate one log from rest at the first sample of the reference.
 
     Parameters: `encoder` rows ``[side (1: motor), zero, cos, sin, step]``; `disturbances` of shape (samples, 4): torques, and noise of the
     encoders; `reference` of shape (samples, 2, 6): position, velocity, feed-forward torque, gains, largest command; `pushes` rows

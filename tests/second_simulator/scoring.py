@@ -1,4 +1,4 @@
-"""What the answers come to: right first causes, false names, claimed against right."""
+"""Scores of the answers: right first causes, wrongly named effects, and stated probabilities against shares that are right."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ import numpy as np
 from armgap.trial.verdict import equivalent
 
 Record = dict[str, Any]
-#: Edges of the table of claimed against right.
+#: Limits of the probability ranges for which the share of right causes is reported.
 EDGES = (0.0, 0.5, 0.75, 0.9, 1.001)
-#: An effect that makes less of the mean square miss is not asked for by name.
+#: Share of the mean square prediction error below which a hidden effect need not be named.
 HALF = 0.5
 
 
 def is_true(record: Record, cause: Record, main_only: bool = False) -> bool:
-    """Whether a cause, or one of its listed equivalents, is in the arm."""
+    """Return whether a cause, or one of its listed equivalents, is in the arm; with `main_only`, is the hidden effect and not clutter."""
     hidden = [(h["effect"], h["joint"]) for h in record["effects"] + ([] if main_only else record["clutter"])]
     if not main_only and record["family"].startswith("clutter"):
-        # Current loops and the commands that come late are in every cluttered arm.
+        # The lag of the current loop and the delay of the commands are in every arm of the clutter families.
         hidden += [(effect, j) for effect in ("actuator_lag", "actuator_delay") for j in (1, 2)]
     names = [(cause["effect"], cause["joint"])] + [(e["effect"], e["joint"]) for e in cause["equivalents"]]
     return any(equivalent(n, h) for n in names for h in hidden)
 
 
 def report(records: list[Record], cases: bool) -> str:
-    """Tables as text."""
+    """Return the tables of scores as text, with a line for each case that is not right if `cases` is set."""
     failed = [r for r in records if "failed" in r]
     records = [r for r in records if "failed" not in r]
     lines = [f"{len(records)} answers, {len(failed)} failed", ""]
