@@ -1,4 +1,4 @@
-"""A wheel in a fresh virtual environment without Rust: what a user does first works, and importing is fast.
+"""Check of a wheel in a fresh virtual environment without Rust: the first commands of a user work, and importing is fast.
 
 Usage: python check_wheel.py WHEEL
 """
@@ -14,14 +14,14 @@ import tempfile
 import venv
 from pathlib import Path
 
-#: Longest import of everything a script needs, s.
+#: Longest time for importing everything that a script needs, s.
 LONGEST_IMPORT_S = 0.6
 IMPORTS = ("import armgap", "from armgap import Arm, Log, diagnose, identify, simulate", "import armgap.cli")
 REPEATS = 5
 
 
 def main(wheel: str) -> None:
-    """Install the wheel, use it, and say what was seen; end with status 1 at the first thing that fails."""
+    """Install the wheel, use it, and print the results; end with status 1 at the first failure."""
     with tempfile.TemporaryDirectory(prefix="armgap-wheel-") as scratch:
         home = Path(scratch)
         venv.create(home / "venv", with_pip=True)
@@ -34,7 +34,7 @@ def main(wheel: str) -> None:
 
 
 def run(home: Path, *words: object) -> subprocess.CompletedProcess[str]:
-    """Run a command in an environment in which no Rust and no source tree is found."""
+    """Run a command in an environment in which neither Rust nor the source tree is found."""
     environment = {"PATH": f"{home / 'venv' / 'bin'}:/usr/bin:/bin", "HOME": str(home), "NO_COLOR": "1"}
     kept = {k: v for k, v in os.environ.items() if k.lower().endswith("_proxy") or k.startswith(("PIP_", "SSL_"))}
     done = subprocess.run(
@@ -46,7 +46,7 @@ def run(home: Path, *words: object) -> subprocess.CompletedProcess[str]:
 
 
 def check_commands(home: Path, python: Path) -> None:
-    """Demo, diagnosis and export, from the files the wheel brings."""
+    """Check that demo, diagnosis and export work with the files that the wheel contains."""
     where = run(home, python, "-c", "import armgap; print(armgap.__file__)").stdout.strip()
     assert where.startswith(str(home)), f"another armgap was imported: {where}"
     armgap, case = home / "venv" / "bin" / "armgap", Path(where).parent / "demo_case"
@@ -62,14 +62,14 @@ def check_commands(home: Path, python: Path) -> None:
 
 
 def check_import(home: Path, python: Path, statement: str) -> None:
-    """The best of a few runs of ``-X importtime``, so that a busy machine does not decide."""
+    """Check the shortest of several import times (``-X importtime``) of a statement, so that other load on the machine has less influence."""
     seconds = min(import_time(run(home, python, "-X", "importtime", "-c", statement).stderr) for _ in range(REPEATS))
     assert seconds < LONGEST_IMPORT_S, f"`{statement}` takes {seconds:.2f} s, more than {LONGEST_IMPORT_S} s"
     print(f"wheel: `{statement}` takes {seconds:.3f} s")
 
 
 def import_time(text: str) -> float:
-    """Sum of each module's own time [s]."""
+    """Return the sum of the modules' own import times [s] in the output of ``-X importtime``."""
     return sum(int(own) for own in re.findall(r"^import time: +(\d+) \|", text, re.MULTILINE)) / 1e6
 
 

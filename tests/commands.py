@@ -1,4 +1,4 @@
-"""What the commands declare, walked by tests that are made from it, and calls of them."""
+"""Commands of the command line as tests that loop over all of them need it: declared parameters, and calls in a process."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from armgap.cli import COMMANDS, cli
 
 
 def leaves(command: click.Command, words: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], click.Command]]:
-    """A command and its sub-commands with the words that call them; groups count where they do something by themselves."""
+    """Yield the command and all its sub-commands, each with the words that call it; a group only if it can be called without sub-command."""
     if not isinstance(command, click.Group):
         yield words, command
         return
@@ -41,7 +41,7 @@ def parameters(command: click.Command, kind: type | tuple[type, ...]) -> list[cl
 
 
 def called(parameter: click.Parameter) -> str:
-    """What a message calls it."""
+    """Return the name by which error messages call a parameter: its longest option, or the argument's name."""
     if isinstance(parameter, click.Argument):
         return str(parameter.metavar).strip("[]…")
     return max(parameter.opts, key=len)

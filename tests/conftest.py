@@ -1,4 +1,4 @@
-"""Arms and logs that several tests share."""
+"""Fixtures that several tests share: arms, logs, and calls of the command line."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ torque_limit = [200.0, 15.0]
 """
 
 
-#: Files that take more than a few seconds (`pytest --durations=0`); `make check` leaves them out.
+#: Test files that take more than a few seconds (`pytest --durations=0`); `make check` leaves them out.
 SLOW = {
     "test_back_into_simulator", "test_commanded", "test_crosswise", "test_custom_effects", "test_demo", "test_docs", "test_docs_blocks",
     "test_docs_site", "test_export_serial", "test_fleet", "test_fleet_drift", "test_hidden_states", "test_log_damaged",
@@ -50,12 +50,12 @@ SLOW = {
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
-    """Leave slow files unread where their tests are left out: to import what they use takes as long as many tests."""
+    """Skip the import of slow test files where their tests are deselected, because it takes as long as many tests."""
     return True if config.option.markexpr == "not slow" and collection_path.stem in SLOW else None
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark the tests of slow files."""
+    """Mark the tests in slow files with the marker `slow`."""
     for item in items:
         if item.path.stem in SLOW:
             item.add_marker(pytest.mark.slow)
@@ -82,20 +82,20 @@ def pendulum(tmp_path_factory: pytest.TempPathFactory) -> Arm:
 
 @pytest.fixture(scope="session")
 def seed_log(arm: Arm) -> Log:
-    """Two seconds of Table I's arm under the paper's torques, with velocities."""
+    """Return a log of two seconds of the arm of Table I under the torques of Reyes and Kelly (1997), with measured velocities."""
     t = np.arange(800) * arm.sample_period
     return simulate(arm, t, seed_torque(t), sensor=True, name="seed")
 
 
 @pytest.fixture
 def frame(seed_log: Log) -> pl.DataFrame:
-    """The columns of a log as a table."""
+    """Return the columns of `seed_log` as a table."""
     return seed_log.to_polars()
 
 
 @pytest.fixture
 def run(capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
-    """Run the command line in this process; return its status and what it wrote to the two streams."""
+    """Return a function that runs the command line in this process and returns status, standard output and standard error."""
     from armgap.cli import main
 
     def call(*arguments: str | Path) -> tuple[int, str, str]:
@@ -117,7 +117,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture
 def three(here: Path) -> Path:
-    """A folder with the description and the arm file of `three_joints`."""
+    """Return a folder with the URDF and the arm file of `three_joints`."""
     (here / "three.urdf").write_text(three_joints.URDF)
     (here / "arm.toml").write_text(three_joints.ARM)
     return here

@@ -1,4 +1,4 @@
-"""Damage: what happens to files on their way, made by a seeded generator."""
+"""Damage to files, as copying and storage may cause it, made by a seeded generator."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from armgap import Log
 
 
 def small_log(n: int = 40) -> Log:
-    """A short log of two joints."""
+    """Return a short log of two joints."""
     t = np.arange(n) * 0.0025
     q = np.column_stack([np.sin(9 * t), 0.5 * np.cos(7 * t)])
     tau = np.column_stack([5 * np.cos(9 * t), np.sin(7 * t)])
@@ -19,7 +19,7 @@ def small_log(n: int = 40) -> Log:
 
 
 def damaged(data: bytes, count: int, seed: int) -> Iterator[bytes]:
-    """Give copies that are cut short, or have bytes overwritten, bits flipped, blocks zeroed, filled, doubled or missing."""
+    """Yield copies of a file's bytes that are cut short, or have bytes overwritten, bits flipped, or blocks zeroed, filled, doubled or removed."""
     draw = random.Random(seed)
     ways = (_cut, _overwritten, _flipped, _zeroed, _filled, _doubled, _missing)
     for i in range(count):

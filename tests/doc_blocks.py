@@ -1,4 +1,4 @@
-"""Code blocks of documents: found, run, and their shown output compared with what really comes out."""
+"""Code blocks of documents: they are found, run, and the output that a document shows is compared with the real output."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from pathlib import Path
 
 from armgap.cli import main
 
-#: Figures may move by this part when the method is refined; words may not.
+#: Largest relative difference between a number that a document shows and the real one; words must be equal.
 RELATIVE = 0.1
 NUMBER = r"(?<![\w.])\d+(?:\.\d+)?(?:e[+-]?\d+)?(?![\w])"
 
 
 @dataclass(frozen=True)
 class Block:
-    """One fenced block."""
+    """One fenced code block of a document."""
 
     language: str
     title: str | None
@@ -27,7 +27,7 @@ class Block:
 
 
 def blocks(document: Path) -> list[Block]:
-    """All fenced blocks of a document, in order."""
+    """Return all fenced code blocks of a document, in order."""
     text = document.read_text(encoding="utf-8")
     found = []
     for match in re.finditer(r"^```(\w+)([^\n]*)\n(.*?)^```", text, re.DOTALL | re.MULTILINE):
@@ -38,7 +38,7 @@ def blocks(document: Path) -> list[Block]:
 
 
 def commands(block: Block) -> list[tuple[list[str], str]]:
-    """Words of each ``armgap`` command of a shell block, and the output shown below it."""
+    """Return the words of each ``armgap`` command of a shell block, with the output that is shown below it."""
     prompt = "$ " if block.language == "console" else ""
     found: list[tuple[list[str], str]] = []
     for line in block.text.replace("\\\n", " ").splitlines():
@@ -50,7 +50,7 @@ def commands(block: Block) -> list[tuple[list[str], str]]:
 
 
 def run(block: Block, names: dict[str, object]) -> None:
-    """Run a block in the working directory; raise if it does not do what it shows."""
+    """Run a code block in the working directory; raise if its output is not the one that the document shows."""
     if block.title is not None:
         Path(block.title).write_text(block.text, encoding="utf-8")
     if block.language == "python":
@@ -65,7 +65,7 @@ def run(block: Block, names: dict[str, object]) -> None:
 
 
 def call(words: list[str]) -> tuple[int, str]:
-    """Run the command line in this process; its status and everything it wrote."""
+    """Run the command line in this process; return its status and everything it wrote."""
     out = io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(out):
         try:
@@ -76,7 +76,7 @@ def call(words: list[str]) -> tuple[int, str]:
 
 
 def agrees(shown: str, real: str) -> bool:
-    """Whether a shown text occurs in the real one, up to white space, what ``…`` leaves out, and small changes of numbers."""
+    """Return whether a shown text occurs in the real one, up to white space, parts left out as ``…``, and small changes of numbers."""
     pieces = [" ".join(piece.split()) for piece in shown.split("…")]
     pattern = r".*?".join(_numbers_open(piece) for piece in pieces)
     match = re.search(pattern, " ".join(real.split()), re.DOTALL)
@@ -87,6 +87,6 @@ def agrees(shown: str, real: str) -> bool:
 
 
 def _numbers_open(piece: str) -> str:
-    """A pattern for a piece of text in which every number may be another one."""
+    """Return a regular expression for a piece of text in which every number may have another value."""
     words = re.split(NUMBER, piece)
     return f"({NUMBER})".join(re.escape(word) for word in words)

@@ -1,4 +1,4 @@
-"""The two-link arm with dry friction, integrated by scipy: an oracle that shares no code with any engine.
+"""Reference solution of the two-link arm with dry friction, integrated by scipy without code of any other engine.
 
 Equations of motion as in Reyes and Kelly (1997), section 5. Each joint slides one way, slides the other way, or sticks;
 between changes the equations are smooth and DOP853 integrates them to 1e-10; changes are located as events.
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 Array = NDArray[np.float64]
-STANDING = 2e-5  # rad/s; slower than any joint that moves at a sample
+STANDING = 2e-5  # rad/s; below the speed of any joint that moves at a sample
 
 
 def nothing(t: float, q: Array, dq: Array) -> Array:
@@ -23,7 +23,7 @@ def nothing(t: float, q: Array, dq: Array) -> Array:
 
 @dataclass
 class DryArm:
-    """Nine parameters, further torques ``extra(t, q, dq)``, further Coulomb levels, and inertia on the diagonal."""
+    """Two-link arm: nine parameters `theta`, added torques ``extra(t, q, dq)`` and Coulomb levels ``level(t, q, dq)``, rotor inertias, tilt."""
 
     theta: Sequence[float]
     extra: Callable[[float, Array, Array], Array] = nothing
@@ -32,7 +32,7 @@ class DryArm:
     tilt: float = 0.0
 
     def window(self, t: Array, tau: Array, q0: Array, dq0: Array) -> Array:
-        """Positions at `t` from a start state under held torques; (n_samples, 2)."""
+        """Return the positions at times `t` from an initial state, with the torques `tau` held between samples, shape (n_samples, 2)."""
         y = np.r_[q0, np.where(np.abs(dq0) < STANDING, 0.0, dq0)]
         mode, rows = np.sign(y[2:]), [y[:2]]
         for k in range(len(t) - 1):
@@ -58,7 +58,7 @@ class DryArm:
         return np.r_[y[2:], self._accelerate(t, y, mode, tau)[0]]
 
     def _accelerate(self, t: float, y: Array, mode: Array, tau: Array) -> tuple[Array, Array]:
-        """Accelerations, and at sticking joints the friction that holds them."""
+        """Return the accelerations, and the friction torques that hold sticking joints at rest."""
         q, dq, th = y[:2], y[2:], self.theta
         cos, sin = np.cos(q[1]), np.sin(q[1])
         off = th[2] + th[1] * cos
@@ -77,7 +77,7 @@ class DryArm:
         return np.maximum(np.array(self.theta[7:9]) + self.level(t, y[:2], y[2:]), 0.0)
 
     def _settle(self, t: float, y: Array, mode: Array, tau: Array) -> Array:
-        """Let joints at rest go or hold until nothing changes."""
+        """Return the modes after joints at rest have begun to slide or to stick, repeated until no mode changes."""
         mode = mode.copy()
         for _ in range(6):
             ddq, hold = self._accelerate(t, y, mode, tau)

@@ -14,7 +14,7 @@ THETA = {
     "pendulum": [0.31, 9.2, 0.2, 0.9],
     "two-link": [2.351, 0.0838, 0.102, 38.465, 1.8266, 2.288, 0.175, 7.6, 1.734],
 }
-# One value per effect that some simulator has a field for, on the last joint; the names are the catalogue's.
+# Parameters of one instance, on the last joint, of every effect for which some simulator has a field; names are those of the effect library.
 SIZES: dict[str, dict[str, float]] = {
     "payload": {"mass": 0.7, "distance": 0.2},
     "rotor_inertia": {"inertia": 0.05},
@@ -41,7 +41,7 @@ def make_arm(kind: str, **more: Any) -> Arm:
 
 
 def found(arm: Arm, *causes: tuple[str, int | None, dict[str, float]], verdict: str = "effect") -> Diagnosis:
-    """A diagnosis that found the arm's own values and these causes."""
+    """Return a diagnosis with the arm's own parameter values and the given causes."""
     values = {
         n: {"value": float(v), "sigma": float(s), "unit": u}
         for n, v, s, u in zip(arm.parameter_names, arm.theta, arm.sigma, arm.parameter_units, strict=True)

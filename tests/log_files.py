@@ -17,7 +17,7 @@ JOINT_STATE, COMMAND = "/joint_states", "/effort_controller/commands"
 
 
 def stamps(log: Log) -> np.ndarray:
-    """Stamps [ns] since 1970."""
+    """Return the time stamps of a log as nanoseconds since 1970."""
     return START_NS + np.round(log.t * 1e9).astype(np.int64)
 
 
@@ -53,7 +53,7 @@ def mat5(log: Log, path: Path) -> Path:
 
 
 def mat73(log: Log, path: Path) -> Path:
-    """As MATLAB lays out version 7.3: a block of text before the HDF5 file, columns first, classes as attributes."""
+    """Write a log as MATLAB's version 7.3 lays it out: a text block before the HDF5 file, columns first, classes as attributes."""
     import h5py
 
     path = path.with_suffix(".mat")
@@ -99,7 +99,7 @@ uint32 stride
 
 
 def mcap(log: Log, path: Path, tau: Callable[[int], int | None] | None = None, **options: Any) -> Path:
-    """Joint states with effort; with `tau` also commands at other times, given by the index of each."""
+    """Write a log as MCAP file of joint states with effort; `tau` maps a sample's index to the delay [ns] of an added torque command, or None."""
     from mcap_ros2.writer import Writer
 
     path = path.with_suffix(".mcap")
@@ -118,7 +118,7 @@ def mcap(log: Log, path: Path, tau: Callable[[int], int | None] | None = None, *
 
 
 def bag(log: Log, path: Path, storage: str = "sqlite3") -> Path:
-    """A ROS 2 bag with joint states, and the torques as commands of effort in joint trajectories."""
+    """Write a log as ROS 2 bag with joint states, and the torques as effort commands in joint trajectories."""
     from rosbags.rosbag2 import StoragePlugin, Writer
     from rosbags.typesys import Stores, get_typestore
 
@@ -150,4 +150,4 @@ WRITERS: dict[str, Callable[[Log, Path], Path]] = {
     "ROS 2 bag": bag,
     "ROS 2 bag in MCAP": lambda log, path: bag(log, path, "mcap"),
 }
-"""How a log is written in each format; each returns the path to read."""
+"""Functions that write a log to a path, by format; each returns the path to read."""

@@ -1,4 +1,4 @@
-"""A described arm with causes, and the torques that it then needs by Pinocchio: what exported files of serial arms are compared with."""
+"""Serial arm from a URDF with causes, and its torques computed with Pinocchio, with which exported files are compared."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from export_cases import found
 
 Array = np.ndarray
 
-#: Three joints, a flange and a camera that hang on the last link, and all that an export has to leave as it is.
+#: URDF of three joints, with a flange and a camera on the last link, and with all elements that an export has to leave unchanged.
 URDF = """\
 <?xml version="1.0" encoding="utf-8"?>
 <!-- before the root -->
@@ -72,7 +72,7 @@ URDF = """\
 </robot>
 """
 CHAIN = ("turn", "lift", "slide")
-#: Values that the description does not have.
+#: Rotor inertias, viscous and Coulomb friction per joint, which the URDF does not have [SI].
 ROTOR, VISCOUS, COULOMB = np.array([0.3, 0.2, 2.0]), np.array([1.0, 0.8, 6.0]), np.array([0.7, 0.9, 3.0])
 STATES = 30
 PAYLOAD = {"mass": 0.8, "com_x": 0.03, "com_y": 0.05, "com_z": 0.1}
@@ -90,7 +90,7 @@ LINK = {
     "iyz": 0.0,
     "izz": 0.02,
 }
-#: Effect, joint and values of each case.
+#: Causes of each case: effect, joint (from 1; None for the whole arm) and parameters.
 CAUSES: dict[str, tuple[tuple[str, int | None, dict[str, float]], ...]] = {
     "none": (),
     "payload": (("payload", None, PAYLOAD),),
@@ -107,7 +107,7 @@ CAUSES: dict[str, tuple[tuple[str, int | None, dict[str, float]], ...]] = {
 
 
 def described_arm(folder: Path) -> Arm:
-    """The arm of the `URDF`, which is written to the folder, with drives and friction."""
+    """Return the arm of the `URDF`, which is written to the folder, with rotor inertias and friction added."""
     path = folder / "described.urdf"
     path.write_text(URDF)
     arm = read_model(path, trust="cad", sample_period=0.002)
@@ -116,7 +116,7 @@ def described_arm(folder: Path) -> Arm:
 
 
 def states(seed: int = 5) -> list[tuple[Array, Array, Array]]:
-    """Readings, velocities and accelerations; all joints slide."""
+    """Return random positions (as encoders show them), velocities and accelerations of the three joints, none of them at rest."""
     rng = np.random.default_rng(seed)
     q = rng.uniform(-1, 1, (STATES, 3)) * np.array([2.0, 3.0, 0.25])
     dq = rng.uniform(0.3, 1.5, (STATES, 3)) * rng.choice([-1, 1], (STATES, 3))
@@ -124,12 +124,12 @@ def states(seed: int = 5) -> list[tuple[Array, Array, Array]]:
 
 
 def by_pinocchio(urdf: str) -> Any:
-    """A description as Pinocchio reads it."""
+    """Return Pinocchio's model of a URDF text."""
     return pytest.importorskip("pinocchio").buildModelFromXML(urdf)
 
 
 def expected(causes: tuple[tuple[str, int | None, dict[str, float]], ...], q: Array, dq: Array, ddq: Array) -> Array:
-    """Torques of the described arm with causes: Pinocchio moves the nominal links, causes are added by hand."""
+    """Return the torques of the described arm with causes [N m or N]: links by Pinocchio, causes by their equations."""
     pin = pytest.importorskip("pinocchio")
     model = by_pinocchio(URDF)
     q, tau = q.copy(), VISCOUS * dq + COULOMB * np.sign(dq) + ROTOR * ddq
@@ -141,7 +141,7 @@ def expected(causes: tuple[tuple[str, int | None, dict[str, float]], ...], q: Ar
             dynamic = model.inertias[joint].toDynamicParameters() + np.array(list(p.values()))
             model.inertias[joint] = pin.Inertia.FromDynamicParameters(dynamic)
         elif effect == "base_tilt":
-            turned = pin.exp3(np.array([p["x"], p["y"], 0.0]))  # of the root, which is the base
+            turned = pin.exp3(np.array([p["x"], p["y"], 0.0]))  # rotation of the base
             model.gravity.linear = turned.T @ np.array([0.0, 0.0, -9.81])
         elif effect == "encoder_offset":
             q[joint - 1] -= p["offset"]
@@ -153,7 +153,7 @@ def expected(causes: tuple[tuple[str, int | None, dict[str, float]], ...], q: Ar
 
 
 def configuration(model: Any, q: Array) -> Array:
-    """Joint positions as Pinocchio wants them: cosine and sine of a joint without limits."""
+    """Return joint positions in Pinocchio's form: cosine and sine for a joint without limits."""
     out = []
     for joint, x in zip(model.joints[1:], q, strict=True):
         out += [x] if joint.nq == 1 else [np.cos(x), np.sin(x)]
@@ -161,7 +161,7 @@ def configuration(model: Any, q: Array) -> Array:
 
 
 def diagnosed(arm: Arm, theta: Array | None = None, case: str = "none") -> Diagnosis:
-    """A diagnosis of the arm that found these values and the causes of a case."""
+    """Return a diagnosis of the arm with the causes of a case, and with parameter values `theta` if they are given."""
     if theta is None:
         return found(arm, *CAUSES[case])
     data = found(arm, *CAUSES[case]).to_dict()

@@ -60,7 +60,7 @@ JOINTS = ("lift", "shoulder", "elbow")
 
 
 def motion(samples: int = 400) -> pl.DataFrame:
-    """A motion of the three joints, in columns named after them."""
+    """Return a motion of the three joints as a table, with positions, velocities and torques in columns named after the joints."""
     t = np.arange(samples) * 0.002
     data = {"t": t}
     for j, joint in enumerate(JOINTS):
@@ -71,9 +71,9 @@ def motion(samples: int = 400) -> pl.DataFrame:
 
 
 def refused(answer: tuple[int, str, str], says: tuple[str, ...]) -> None:
-    """Assert that a command complained in one line and did nothing else."""
+    """Assert that a command wrote nothing but one line of error, which contains the texts `says` and an advice."""
     status, out, err = answer
     assert (status, out, err.count("\n")) == (2, "", 1), err
     for words in says:
         assert words in err
-    assert err.count(";") >= 1  # what to do about it
+    assert err.count(";") >= 1  # the advice follows a semicolon

@@ -1,4 +1,4 @@
-"""Write the list of constants, from the sources: python tools/constants.py docs/reference/constants.md."""
+"""Write the list of all named numbers in the sources: python tools/constants.py docs/reference/constants.md."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parents[1]
-#: What is listed: title and folder.
+#: Packages whose constants are listed: title and source folder.
 PACKAGES = {
     "armgap-core": "rust/core/src",
     "armgap-fit": "rust/fit/src",
@@ -22,10 +22,10 @@ HEAD = """# Constants
 What decides in this library and is no setting: every named number of the sources with its value, unit, reason and file. Without a unit it is
 a ratio or a count, or the reason says it. Written by `tools/constants.py`.
 """
-#: Units as texts say them: behind the last comma, or in brackets.
+#: Regular expression for units in comments, where a unit stands after the last comma or in brackets.
 _UNITS = r"1/s|s|ms|rad|m|mm|deg|kg|N m|Hz|W|KB|MB|bytes|rad/s|m/s|m/s\^2|kg m\^2|samples|standard deviations|standard errors|degrees"
 _UNIT = re.compile(rf"\[({_UNITS}|SI)\]|, ({_UNITS})(?=[.:;,]|$)")
-#: Units as names say them.
+#: Suffixes of constants' names, with the units that these suffixes stand for.
 _SUFFIXES = {"_S": "s", "_RAD": "rad", "_M": "m", "_HZ": "Hz", "_US": "us", "_BYTES": "bytes", "_SAMPLES": "samples"}
 _RUST = re.compile(
     r"((?:^///[^\n]*\n)*)^(pub(?:\([a-z]+\))? )?const ([A-Z][A-Z0-9_]*): ([^=]+?) =\s*([^;]+);",
@@ -40,7 +40,7 @@ _TESTS = re.compile(r"^#\[cfg\(test\)\]\n(?:#\[.*\]\n)*(?:pub(?:\(\w+\))? )?mod 
 
 
 class Constant(NamedTuple):
-    """A named number: name, value as the source writes it, unit (empty for a ratio or count), reason, file, whether other files may use it."""
+    """A named number: name, value as the source writes it, unit (empty for a ratio or count), comment, file, whether other files may use it."""
 
     name: str
     value: str
@@ -51,7 +51,7 @@ class Constant(NamedTuple):
 
 
 def constants(folder: Path) -> list[Constant]:
-    """Return the constants of a package in order of file and line."""
+    """Return the constants in a package's sources, in order of file and line."""
     found: list[Constant] = []
     for path in sorted([*folder.rglob("*.rs"), *folder.rglob("*.py")]):
         read = _of_rust if path.suffix == ".rs" else _of_python
@@ -71,7 +71,7 @@ def _of_rust(text: str, file: str) -> Iterator[Constant]:
     for match in _RUST.finditer(program):
         comment, public, name, kind, value = match.groups()
         own = " ".join(line.strip().removeprefix("///").strip() for line in comment.splitlines())
-        # One comment stands above several lines that belong together.
+        # A comment also applies to the constants on the lines directly below its own.
         reason = own or (reason if match.start() == end + 1 else "")
         end = match.end()
         if _NUMBER.sub("", value).strip() or not re.search(r"\d|f64::", value) or "&" in kind:
@@ -98,7 +98,7 @@ def _of_python(text: str, file: str) -> Iterator[Constant]:
 
 
 def _pairs(target: ast.expr, value: ast.expr) -> Iterator[tuple[str, str]]:
-    """Upper-case names with their numbers, of one assignment or of several side by side."""
+    """Yield upper-case names with their numbers, from an assignment of one name or of a tuple of names."""
     if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple):
         for one, its in zip(target.elts, value.elts, strict=True):
             yield from _pairs(one, its)
@@ -117,7 +117,7 @@ def _is_number(value: ast.expr) -> bool:
 
 
 def _comment(lines: list[str], first: int) -> str:
-    """The comment above a line."""
+    """Return the comment above line `first`, empty if there is none."""
     found: list[str] = []
     for line in reversed(lines[: first - 1]):
         if not line.startswith("#"):
@@ -127,7 +127,7 @@ def _comment(lines: list[str], first: int) -> str:
 
 
 def _beside(line: str) -> str:
-    """The comment behind a value."""
+    """Return the comment at the end of a line, empty if there is none."""
     return line.partition("  # ")[2]
 
 
@@ -139,7 +139,7 @@ def _docstring(body: list[ast.stmt], i: int) -> str:
 
 
 def page() -> str:
-    """Return the page."""
+    """Return the list of constants as a Markdown page."""
     parts = [HEAD]
     for title, folder in PACKAGES.items():
         rows = [f"| `{c.name}` | `{c.value}` | {c.unit} | {c.reason} | `{c.file}` |" for c in constants(ROOT / folder)]

@@ -1,4 +1,4 @@
-"""Write docs/conventions.svg: the sketch of each kind's zero, positive direction, elbow angle, sign of the torque and gravity."""
+"""Write docs/conventions.svg: sketch of zero position, positive direction, elbow angle, sign of torque and gravity for each kind of arm."""
 
 from __future__ import annotations
 

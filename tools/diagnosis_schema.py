@@ -10,7 +10,7 @@ from armgap.diagnosis import diagnosis_schema
 
 
 def text() -> str:
-    """Return the schema as it is kept."""
+    """Return the JSON Schema of a diagnosis as the text of its file."""
     return json.dumps(diagnosis_schema(), indent=1, ensure_ascii=False) + "\n"
 
 

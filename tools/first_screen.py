@@ -1,4 +1,4 @@
-"""Write docs/first-screen.png: the first screen of the sample case's report, in Chromium."""
+"""Write docs/first-screen.png: first screen of the report on the sample case, as Chromium shows it."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from armgap import Arm, diagnose
 from armgap.cli.demo import CASE_FOLDER
 from armgap.report import write_html
 
-#: Width and height of the window [px]; the height shows the three answers and both pictures.
+#: Width and height of the browser window [px]; the height fits the three answers and both charts.
 SIZE = (1180, 780)
-#: Colours of the picture's palette: a quarter of the size of full colour, and no difference to the eye.
+#: Number of colours in the image's palette: the file is a quarter as large as in full colour, without visible difference.
 COLOURS = 128
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 TARGET = Path(__file__).resolve().parents[1] / "docs" / "first-screen.png"
 
 
 def main() -> None:
-    """Diagnose the sample case, and take the picture when all charts are drawn."""
+    """Diagnose the sample case, and save the image of its report when all charts are drawn."""
     result = diagnose(
         CASE_FOLDER / "train-1.parquet", Arm.read(CASE_FOLDER / "arm.toml"), holdout=CASE_FOLDER / "holdout-1.parquet"
     )

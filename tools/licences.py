@@ -22,7 +22,7 @@ metadata; written by `tools/licences.py`.
 
 
 def main(words: list[str]) -> None:
-    """Print the page, or write it."""
+    """Print the page of licences, or write it to the file that `words` name."""
     text = f"{HEAD}\n## Crates\n\n{_table(crates())}\n\n## Python packages\n\n{_table(packages())}\n"
     if words:
         Path(words[0]).write_text(text, encoding="utf-8")
@@ -31,7 +31,7 @@ def main(words: list[str]) -> None:
 
 
 def crates() -> list[tuple[str, str, str]]:
-    """Name, version and licence of every crate that is linked."""
+    """Return name, version and licence of every crate that is linked into the wheel or the C library."""
     command = [
         "cargo",
         "tree",
@@ -57,7 +57,7 @@ def crates() -> list[tuple[str, str, str]]:
 
 
 def packages() -> list[tuple[str, str, str]]:
-    """Name, least version and licence of every package that the wheel asks for."""
+    """Return name, least version and licence of every Python package that the wheel requires."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     found = []
     for requirement in project["dependencies"]:

@@ -1,7 +1,7 @@
-"""What the documentation site takes from the program: the catalogue, the commands, and pages outside of docs/.
+"""Hooks of MkDocs that add content from armgap to the documentation site: effect library, commands, and pages outside of docs/.
 
-Hooks of MkDocs: a page of docs/effects says in words what an effect is; its equation, parameters, bounds, picture and the
-fields of simulators come from the program when the site is built, so that they cannot differ from it.
+A page of docs/effects describes an effect in words; its equation, parameters, bounds, picture and the fields of simulators are taken
+from the program when the site is built, so that they cannot differ from it.
 """
 
 from __future__ import annotations
@@ -58,17 +58,17 @@ FAMILIES = {
     "Sensor": ("encoder_offset", "encoder_eccentricity"),
     "Surroundings": ("contact", "external_pulse"),
 }
-#: Pages from the root of the repository: title, file, name on the site.
+#: Pages that lie in the root of the repository: name on the site, and file.
 OUTSIDE = {"architecture.md": "ARCHITECTURE.md", "contributing.md": "CONTRIBUTING.md", "changelog.md": "CHANGELOG.md"}
 
 
 def catalogue() -> dict[str, dict[str, Any]]:
-    """Effects by name."""
+    """Return the entries of the effect library by name of the effect."""
     return {entry["name"]: entry for entry in effects()}
 
 
 def on_config(config: Any) -> Any:
-    """Complete the navigation: effects by family, decisions, and pages that nobody listed."""
+    """Return MkDocs' configuration with a complete navigation: effects by family, decisions, and all pages that it does not list."""
     docs = Path(config["docs_dir"])
     known = catalogue()
     filled = []
@@ -101,7 +101,7 @@ def _exists(docs: Path, item: Any) -> bool:
 
 
 def on_files(files: Files, config: Any) -> Files:
-    """Add what is made at build time; leave out pages of effects that the program does not have."""
+    """Return the site's files with those made at build time, and without pages of effects that the program does not have."""
     known = catalogue()
     for file in list(files):
         path = Path(file.src_uri)
@@ -116,7 +116,7 @@ def on_files(files: Files, config: Any) -> Files:
 
 
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
-    """Put the catalogue into pages of effects, and mend links that lead out of docs/."""
+    """Return a page's Markdown with content from the effect library, and with repaired links to files outside of docs/."""
     path = Path(page.file.src_uri)
     if path.parent == Path("effects"):
         filled = overview() if path.stem == "index" else facts(path.stem)
@@ -127,7 +127,7 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
 
 
 def mended(markdown: str, path: str) -> str:
-    """Links between the repository's root and docs/ as they are on the site; what is not on it becomes plain text."""
+    """Return Markdown with links between the repository's root and docs/ changed to those of the site; other local links become text."""
     pages = {source: target for target, source in OUTSIDE.items()}
     known = catalogue()
 
@@ -156,13 +156,13 @@ def mended(markdown: str, path: str) -> str:
 
 
 def figures() -> str:
-    """Links to pages of measured figures, as far as they are there."""
+    """Return a Markdown list of links to the pages of scores and benchmarks that exist."""
     pages = {"trial-scores.md": "Scores of the blind trials, beside other methods", "benchmarks.md": "Costs, measured"}
     return "\n".join(f"* [{title}]({page})." for page, title in pages.items() if (ROOT / "docs" / page).is_file())
 
 
 def thresholds() -> str:
-    """Constants of the decision with what their comments say."""
+    """Return a Markdown table of the constants that decide about effects, with their comments."""
     files = ("search/acceptance.rs", "likelihood/holdout.rs")
     source = "\n".join((ROOT / "rust" / "fit" / "src" / file).read_text(encoding="utf-8") for file in files)
     found = re.findall(r"^/// ([^\n]+)\n(?:pub )?const (\w+): \w+ = ([^;]+);", source, re.MULTILINE)
@@ -172,7 +172,7 @@ def thresholds() -> str:
 
 
 def overview() -> str:
-    """Table of all effects by family."""
+    """Return Markdown tables of all effects, one per family."""
     known = catalogue()
     parts = []
     for family, names in FAMILIES.items():
@@ -186,7 +186,7 @@ def overview() -> str:
 
 
 def facts(name: str) -> str:
-    """Equation, picture, parameters and fields of an effect."""
+    """Return equation, picture, parameters and simulators' fields of an effect as Markdown."""
     entry = catalogue()[name]
     where = "one joint" if entry["scope"] == "joint" else "the arm as a whole"
     lines = [
@@ -263,7 +263,7 @@ def _fields(name: str) -> list[str]:
 
 
 def commands() -> str:
-    """Every command's own help, sub-commands below their group."""
+    """Return the help texts of all commands as Markdown, with sub-commands below their groups."""
     lead = "`armgap COMMAND --help` prints these texts. Exit status: 0 done, 2 unusable input, 130 interrupted.\n"
     context = cli.make_context("armgap", [], resilient_parsing=True)
     return "\n".join(["# Commands\n", lead, *(line for name in COMMANDS for line in _help(cli, context, (name,)))])

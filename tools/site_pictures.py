@@ -1,6 +1,6 @@
-"""The picture of an effect's signature: the same torques with and without it, and the residual torque of the nominal model.
+"""Picture of an effect for the documentation: positions with and without it under equal torques, and residual torque of the nominal model.
 
-Everything is simulated when the site is built; nothing is drawn from memory.
+The curves are simulated when the site is built.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ DURATION_S = 8.0
 INK = "#808890"
 WITHOUT = "#0072B2"
 WITH = "#D55E00"
-#: A bench pendulum: inertia [kg m^2], m g l [N m], viscous [N m s/rad], Coulomb [N m]; and two of them in a row, for effects
-#: between joints.
+#: Parameters of a bench pendulum: inertia [kg m^2], m g l [N m], viscous [N m s/rad] and Coulomb friction [N m]; and those of a two-link
+#: arm of two pendulums, for effects between joints.
 THETA = {
     "pendulum": np.array([0.05, 0.6, 0.02, 0.1]),
     "two-link": np.array([0.12, 0.02, 0.03, 1.4, 0.5, 0.02, 0.01, 0.1, 0.06]),
 }
-#: What stands on the horizontal axis of the second panel.
+#: Labels of the horizontal axis in the chart of the residual torque, by variable.
 AXES = {
     "dq": "velocity dq [rad/s]",
     "q": "position q [rad]",
@@ -44,9 +44,9 @@ AXES = {
 
 @dataclass(frozen=True)
 class Signature:
-    """How an effect is shown: its size, the variable that reveals it, how strongly the arm is driven, and which arm.
+    """Settings of an effect's picture: parameters, variable that reveals the effect, factor on the torques, and kind of arm.
 
-    Joint 1 is shown; it is also where an effect of one joint sits.
+    The picture shows joint 1, which also has the effect if it is an effect of one joint.
     """
 
     parameters: dict[str, float]
@@ -54,7 +54,7 @@ class Signature:
     drive: float = 0.8
     kind: str = "pendulum"
     tolerance: float = 1e-4
-    """Of the simulated positions [rad]; knocks amplify errors."""
+    """Tolerance of the simulated positions [rad]; a larger one for effects with impacts, which amplify errors."""
 
 
 SIGNATURES: dict[str, Signature] = {
@@ -89,23 +89,23 @@ SIGNATURES: dict[str, Signature] = {
     "contact": Signature({"position": 0.6, "stiffness": 8.0, "damping": 0.05}, "q"),
     "external_pulse": Signature({"impulse": 0.06, "time": 4.0, "duration": 0.2}, "t"),
 }
-"""One per effect; sizes are large enough to be seen with the naked eye."""
+"""Settings of the pictures by effect; parameters are large enough for a visible difference."""
 
 
 def residual_torque(kind: str, q: NDArray[np.float64], tau: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
-    """Residual torque of joint 1 of the nominal arm, and what it may depend on.
+    """Return the residual torque of joint 1 of the nominal arm, and the variables on which it may depend.
 
     Parameters
     ----------
     kind : {"pendulum", "two-link"}
         Key of `THETA`.
     q, tau : ndarray, shape (n, n_joints)
-        Positions [rad] and held torques [N m] at the samples.
+        Positions [rad] and torques [N m] at the samples; torques are held until the next sample.
 
     Returns
     -------
     dict of ndarray, shape (n - 2,)
-        Keys of `AXES` and ``"residual"``, at all samples but the outer ones.
+        Variables of `AXES` and ``"residual"`` [N m], at all samples but the first and the last.
     """
     dq = (q[2:] - q[:-2]) / (2 * PERIOD_S)
     ddq = (q[2:] - 2 * q[1:-1] + q[:-2]) / PERIOD_S**2
@@ -129,7 +129,7 @@ def residual_torque(kind: str, q: NDArray[np.float64], tau: NDArray[np.float64])
 def _first_joint(
     kind: str, q: NDArray[np.float64], dq: NDArray[np.float64], ddq: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Inertial and friction torque, and gravity torque, of joint 1 by its equation of motion."""
+    """Return inertial plus friction torque, and gravity torque, of joint 1 by its equation of motion [N m], shape (n,) each."""
     p = THETA[kind]
     if kind == "pendulum":
         friction = p[2] * dq[:, 0] + p[3] * np.sign(dq[:, 0])
@@ -142,7 +142,7 @@ def _first_joint(
 
 
 def placed(name: str) -> list[Effect]:
-    """The effect as the picture shows it, with the parameters the catalogue knows."""
+    """Return the effect of a picture, with those parameters of its settings that the effect library has."""
     entry = next(e for e in effects() if e["name"] == name)
     sizes = SIGNATURES[name].parameters
     known = {p["name"]: sizes[p["name"]] for p in entry["parameters"]}
@@ -150,7 +150,7 @@ def placed(name: str) -> list[Effect]:
 
 
 def motion(name: str, *, present: bool = True) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Times, positions and torques of the arm of an effect's picture, with the effect or without."""
+    """Return times [s], positions [rad] and torques [N m] of the arm in an effect's picture, with the effect or without it."""
     shown = SIGNATURES[name]
     theta = THETA[shown.kind]
     arm = Arm("bench arm", shown.kind, 9.81, PERIOD_S, theta, 0.1 * theta)
@@ -163,7 +163,7 @@ def motion(name: str, *, present: bool = True) -> tuple[NDArray[np.float64], NDA
 
 
 def draw(name: str) -> bytes:
-    """Return the picture of an effect as SVG."""
+    """Return the picture of an effect as an SVG file."""
     from matplotlib.figure import Figure
 
     shown = SIGNATURES[name]
@@ -177,7 +177,7 @@ def draw(name: str) -> bytes:
     left.legend(frameon=False, labelcolor=INK, fontsize=8)
     _dress(left, "the same torques", "time t [s]", "measured position [rad]")
     seen = residual_torque(shown.kind, with_it, tau)
-    # A joint that stands takes any torque; the samples at which it stops or starts mix two accelerations.
+    # At a joint at rest the friction torque is not determined; samples at which a joint stops or starts mix two accelerations.
     quiet = (np.abs(seen["dq"]) > 1e-3) & (np.abs(seen["residual"]) < 4 * np.quantile(np.abs(seen["residual"]), 0.98))
     right.plot(seen[shown.against][quiet][::5], seen["residual"][quiet][::5], ".", markersize=1.8, color=WITH)
     _dress(right, "residual torque", AXES[shown.against], "torque [N m]")

@@ -2,10 +2,10 @@
 
 The trial's generator (MuJoCo) and armgap share assumptions that real arms do not meet. In this simulator dry friction is a steep hyperbolic
 tangent with a width of its own (in the family ``rounding`` another width per joint, or an algebraic function; in ``presliding`` with
-bristles as well), encoders and friction are on either side of the transmission, commands take effect a fraction of a sample late, every log
-has its own encoder zero (in ``zeros`` and ``zeros-null``, with three training logs, off by up to some degrees), a current loop and small
-effects act together with the hidden one, and a coloured random torque acts on every joint.
+bristles as well), and encoders and friction are on either side of the transmission. In the families ``clutter`` and ``clutter-only`` commands
+take effect a fraction of a sample late, every log has its own encoder zero, and a current loop, small effects and a coloured random torque act
+on the joints. In ``zeros`` and ``zeros-null``, with three training logs, encoder zeros differ by up to some degrees.
 
-``python -m tests.second_simulator make --seed S --cases N -o DIR`` makes cases (`cases.py`), ``python -m tests.second_simulator ask DIR -o
-F.jsonl`` asks `armgap.diagnose`, and ``python -m tests.second_simulator score F.jsonl`` prints the tables.
+``python -m tests.second_simulator make DIR --seed S --families single=20,clutter=30`` makes cases (`cases.py`), ``python -m
+tests.second_simulator ask DIR -o F.jsonl`` asks `armgap.diagnose`, and ``python -m tests.second_simulator score F.jsonl`` prints the tables.
 """

@@ -48,7 +48,7 @@ ALIKE = (
 FAMILIES = (
     "single", "pair", "clutter", "clutter-only", "hidden-state", "null", "rounding", "presliding", "parameters", "outside",
 )  # fmt: skip
-#: Smallest and largest width [rad/s] over which the sign of dry friction is smoothed, equal on both joints; WIDE in "rounding", per joint.
+#: Smallest and largest width [rad/s] over which the sign of dry friction is smoothed: equal on both joints, and (WIDE) per joint in "rounding".
 WIDTHS = (1e-3, 8e-3)
 WIDE = (1e-3, 5e-2)
 #: Smallest and largest standard deviation [rad] of a joint's encoder zero between recordings, in the families "zeros" and "zeros-null".
@@ -291,7 +291,7 @@ def hide(machine: Machine, name: str, j: int, share: float, use: Use, rng: np.ra
 def hide_transmission(
     machine: Machine, name: str, j: int, size: float, use: Use, rng: np.random.Generator
 ) -> dict[str, float]:
-    """Put joint elasticity or backlash between motor and link; the sides of encoder and friction are drawn, and are the same on both joints."""
+    """Put joint elasticity or backlash between motor and link; whether encoder and friction are on the motor side is drawn."""
     p = machine.joints[j]
     rotor = (
         machine.inertia[j] * float(np.exp(rng.uniform(math.log(0.05), math.log(0.25))))

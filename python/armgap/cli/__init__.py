@@ -91,12 +91,12 @@ def cli() -> None:
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line; unusable input ends it with status 2 and one line on standard error."""
     gc.set_threshold(_GARBAGE_EVERY)
-    atexit.register(gc.freeze)  # what is left at the end goes with the process, without being searched
+    atexit.register(gc.freeze)  # objects that remain at the end are not searched by the garbage collector
     open_streams()
     try:
         with ended_by_signals():
             status = _run(arguments)
-            sys.stdout.flush()  # a full disk may show itself only now
+            sys.stdout.flush()  # a full disk may cause an error only here
     except ArmgapError as error:
         _fail(str(error))
     except click.ClickException as error:

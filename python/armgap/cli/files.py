@@ -198,7 +198,7 @@ def _read_by(parameter: click.Parameter, value: str) -> list[_Named]:
     try:
         files = [os.fspath(path) for path in paths([value])]
     except ArmgapError:
-        return []  # that nothing matches is said by who reads it
+        return []  # the function that reads the files reports that none matches the pattern
     return [_named(_label(parameter), file, 0, folder=os.path.isdir(file)) for file in files]
 
 
@@ -231,7 +231,7 @@ def _named(label: str, path: str, stream: int, *, folder: bool, holds: Callable[
     real = Path(os.path.realpath(path))
     places = [real, *real.parents]
     keys = tuple(_key(place) for place in places)
-    if status is not None:  # also right for what realpath cannot name, such as a file that is open but removed
+    if status is not None:  # the identity also of files that realpath cannot name, such as one that is open but removed
         keys = ((status.st_dev, status.st_ino), *keys[1:])
     return _Named(
         label, path, keys, None if status is None else status.st_mode, tuple(p.name for p in places), folder, holds

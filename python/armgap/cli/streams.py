@@ -38,7 +38,7 @@ def open_streams() -> None:
         try:
             os.fstat(number)
         except OSError:
-            os.open(os.devnull, flags)  # takes the lowest number that is free
+            os.open(os.devnull, flags)  # gets the lowest free descriptor
     if sys.stdout is None:
         sys.stdout = open(1, "w", closefd=False, encoding="utf-8")  # noqa: SIM115
     if sys.stderr is None:
@@ -66,7 +66,7 @@ def ended_by_signals() -> Iterator[None]:
     """
     before: dict[int, Any] = {}
     for number in _SIGNALS:
-        with suppress(ValueError):  # not the main thread
+        with suppress(ValueError):  # signals can be set only in the main thread
             if signal.getsignal(number) is signal.SIG_DFL:
                 before[number] = signal.signal(number, _end)
     try:
