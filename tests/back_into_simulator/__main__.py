@@ -32,7 +32,7 @@ class Answer(NamedTuple):
 def main(seed: int, only: tuple[int, ...]) -> None:
     """Compare RMS errors over the windows of the holdout: of the diagnosis, and of MuJoCo with the exported files.
 
-    The URDF is told armature, springs, and how sharp dry friction is, in the last column: it has no fields for these.
+    In the last column armature, springs and the solver settings of dry friction are added to the URDF model: URDF has no fields for these.
     """
     os.environ.update(dict.fromkeys(THREADS, "1"))
     from .cases import CASES, make

@@ -41,7 +41,7 @@ def serial(seed: int, cases: int) -> Iterator[tuple[str, str]]:
 @click.option("--seed", type=click.IntRange(0), required=True, help="Seed of all cases.")
 @click.option("--cases", type=click.IntRange(1), default=40, help="Cases; one in four is a serial arm.")
 def main(seed: int, cases: int) -> None:
-    """Hold diagnoses of planar and serial arms against the schema, and read and write each of them."""
+    """Compare diagnoses of planar and serial arms with the JSON Schema, and check that reading and writing leaves each unchanged."""
     os.environ.update(dict.fromkeys(THREADS, "1"))
     from .checking import losses, misfits
 

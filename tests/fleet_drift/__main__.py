@@ -14,7 +14,7 @@ SETTINGS = {"max_content_width": 100, "show_default": True}
 
 @click.group(name="python -m tests.fleet_drift", context_settings=SETTINGS)
 def main() -> None:
-    """How soon a fleet says that the friction of one robot rises, and how often it says so for nothing."""
+    """Measure after how many visits a fleet reports that the friction of one robot rises, and how often it reports this falsely."""
     os.environ.update(dict.fromkeys(THREADS, "1"))
 
 
@@ -27,7 +27,7 @@ def main() -> None:
 )
 @click.option("--spread", type=click.FloatRange(0), default=0.0, help="Spread of the robots' own scatter (logarithm).")
 def from_rows(seed: int, fleets: int, nulls: int, common: float, spread: float) -> None:
-    """Ask fleets of tables of estimates."""
+    """Draw fleets as tables of estimates, ask after every visit which parameters drift, and print delays and false alarms."""
     import numpy as np
 
     from armgap.fleet.series import moving
@@ -57,7 +57,7 @@ def from_rows(seed: int, fleets: int, nulls: int, common: float, spread: float) 
 @click.option("--workers", type=click.IntRange(1), default=1, help="Processes that diagnose.")
 @click.option("-o", "--output", type=click.Path(file_okay=False, path_type=Path), required=True, help="Folder.")
 def from_logs(seed: int, model: str, robots: int, duration: float, workers: int, output: Path) -> None:
-    """Make the logs of one fleet, diagnose them and ask; goes on where it stopped."""
+    """Make and diagnose the logs of one fleet, and ask which parameters drift; an interrupted run is continued."""
     from .logs import study
 
     click.echo(study(seed, model, robots, duration, workers, output))

@@ -1,4 +1,4 @@
-"""A fleet of some hundred entries: ``python -m tests.fleet_size --help``."""
+"""Test of a fleet of some hundred entries: ``python -m tests.fleet_size --help``."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ FOLDER = click.Path(exists=True, file_okay=False, path_type=Path)
 
 @click.group(name="python -m tests.fleet_size", context_settings={"max_content_width": 100, "show_default": True})
 def main() -> None:
-    """A fleet made from cases of a blind trial, some of its entries broken."""
+    """Test a fleet made from cases of a blind trial, some of whose entries are broken."""
     os.environ.update(dict.fromkeys(THREADS, "1"))
 
 
@@ -29,7 +29,7 @@ def main() -> None:
 )
 @click.option("-o", "--output", type=click.Path(file_okay=False, path_type=Path), required=True, help="Folder.")
 def entries(cases: Path, broken: int, seconds: float, output: Path) -> None:
-    """Write the manifest of two entries per case."""
+    """Write the manifest of the fleet, with two entries per case of the trial."""
     from .entries import write_entries
 
     click.echo(write_entries(cases, broken, seconds, output))
@@ -45,7 +45,7 @@ def _options(max_causes: int | None) -> list[str]:
 @click.option("--workers", type=click.IntRange(1), default=1, help="Processes.")
 @CAUSES
 def restart(folder: Path, kill_after: int, workers: int, max_causes: int | None) -> None:
-    """Run the manifest, killed once and started again."""
+    """Run the fleet command on the manifest, kill it once and start it again."""
     from .running import killed_and_restarted
 
     click.echo(killed_and_restarted(folder, kill_after, workers, _options(max_causes)))
@@ -59,7 +59,7 @@ def restart(folder: Path, kill_after: int, workers: int, max_causes: int | None)
 )
 @CAUSES
 def ray(folder: Path, nodes: int, most: int | None, max_causes: int | None) -> None:
-    """Run the manifest on a Ray cluster and compare its tables with those of the other run."""
+    """Run the manifest on a Ray cluster and compare its tables with those of the run by `restart`."""
     from .running import on_ray
 
     click.echo(on_ray(folder, nodes, most, _options(max_causes)))
@@ -71,7 +71,7 @@ def ray(folder: Path, nodes: int, most: int | None, max_causes: int | None) -> N
 @CAUSES
 @click.option("--pairs", type=click.IntRange(1), default=3, help="Rounds of one run with one worker and one with two.")
 def scaling(folder: Path, count: int, pairs: int, max_causes: int | None) -> None:
-    """Compare one worker with two."""
+    """Compare the times of fleets with one worker and with two."""
     from .scaling import scaling as table
 
     click.echo(table(folder, count, pairs, {} if max_causes is None else {"max_causes": max_causes}))
@@ -83,7 +83,7 @@ def scaling(folder: Path, count: int, pairs: int, max_causes: int | None) -> Non
 @click.option("--rounds", type=click.IntRange(1), default=5, help="Rounds.")
 @CAUSES
 def overhead(folder: Path, failing: int, rounds: int, max_causes: int | None) -> None:
-    """Say what a fleet costs per entry beside its diagnosis; after `restart`."""
+    """Measure the processor time of a fleet per entry apart from its diagnosis; `restart` must have been run before."""
     from .scaling import overhead as figures
 
     click.echo(figures(folder, failing, rounds, {} if max_causes is None else {"max_causes": max_causes}))

@@ -20,7 +20,7 @@ def is_true(record: Record, cause: Record, main_only: bool = False) -> bool:
     """Return whether a cause, or one of its listed equivalents, is in the arm; with `main_only`, is the hidden effect and not clutter."""
     hidden = [(h["effect"], h["joint"]) for h in record["effects"] + ([] if main_only else record["clutter"])]
     if not main_only and record["family"].startswith("clutter"):
-        # The lag of the current loop and the delay of the commands are in every arm of the clutter families.
+        # The lag of the current loop and the delay of the commands are in the arms of the clutter families even if they are not in the key.
         hidden += [(effect, j) for effect in ("actuator_lag", "actuator_delay") for j in (1, 2)]
     names = [(cause["effect"], cause["joint"])] + [(e["effect"], e["joint"]) for e in cause["equivalents"]]
     return any(equivalent(n, h) for n in names for h in hidden)
