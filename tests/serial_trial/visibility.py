@@ -19,18 +19,18 @@ from .motion import Run
 
 Array = NDArray[np.float64]
 
-#: Smallest ratio of RMS torque residuals with and without a visible effect on one joint ...
+#: Ratio of RMS torque residuals with and without an effect, on one joint, from which the effect counts as visible.
 MULTIPLE = 2.0
-#: ... or smallest distance between the parameters re-estimated with and without it, in the arm file's standard deviations. Both limits are those
-#: of the trial of two-link arms (docs/trial-scores.md).
+#: Distance between the parameters re-estimated with and without an effect, in the arm file's standard deviations, from which the effect counts as
+#: visible. `MULTIPLE` and `SIGMAS` are those of the trial of two-link arms (docs/trial-scores.md).
 SIGMAS = 5.0
 #: Standard deviation of the Gaussian filter of positions and torques [s]: it passes the motion but not the encoder's steps.
 FILTER_S = 0.02
 #: Time between consecutive rows of the regression [s].
 SPACING_S = 0.01
-#: Share of a joint's RMS speed below which the joint may be at rest, where dry friction is a bound and not a datum ...
+#: Share of a joint's RMS speed below which the joint may be at rest, where dry friction is a bound and not a datum.
 _SLOW = 0.01
-#: ... and largest share of such samples, weighted by the filter, with which a row is used.
+#: Largest share of samples at which a joint may be at rest, weighted by the filter, with which a row of the regression is used.
 _AT_REST = 0.002
 #: Smallest RMS torque residual that is used in ratios, as a share of the joint's RMS torque.
 _FLOOR = 1e-3
