@@ -102,11 +102,13 @@ def confirmed(
 
     From `samples` the shift changes by one sample at a time for as long as predictions clearly improve. With a large unmodelled effect predictions
     hardly change with a shift, so a shift by several samples is accepted unless predictions get worse. A shift by one sample may come from
-    an effect, so it is accepted only if predictions are clearly worse on either side. A shift that needs parameters outside the bounds, or that
-    predicts worse than no motion at all would, is rejected.
+    an effect, so it is accepted only if predictions are clearly worse on either side, and better than that of no motion. A shift that needs
+    parameters outside the bounds is rejected.
     """
     period = float(np.median(np.concatenate([np.diff(log.t) for log in training])))
-    as_is = Refit.of(arm, training, holdout, horizon).bounded_by_motion()
+    as_is = Refit.of(arm, training, holdout, horizon)
+    if samples <= 1:
+        as_is = as_is.bounded_by_motion()
 
     @cache
     def error(k: int) -> float:
