@@ -105,16 +105,18 @@ def rounded(arm: Arm, tau: np.ndarray, level: float, seed: int) -> Log:
     return replace(simulate(arm, t, tau), q=measured, name=f"run {seed}")
 
 
-def test_a_stand_in_for_the_form_of_a_cause_is_less_sure():
+def test_what_the_form_of_a_cause_leaves_is_no_sure_effect():
     arm = Arm.read(CASE_FOLDER / "arm.toml")
     t = np.arange(2000) * arm.sample_period
     other = np.column_stack([45 * np.sin(9 * t) + 20 * np.sin(17 * t), 6 * np.sin(15 * t + 1) + 4 * np.sin(31 * t)])
     training, holdout = (rounded(arm, tau, 4.0, seed) for seed, tau in enumerate([seed_torque(t), other]))
-    first, *further = diagnose(training, arm, holdout=holdout).causes
+    found = diagnose(training, arm, holdout=holdout)
+    first, *further = found.causes
     assert (first.effect, first.joint) == ("cross_friction", 1)
     assert first.probability > 0.95
-    assert [(c.effect, c.joint) for c in further] == [("stribeck", 2)]
-    assert further[0].probability < 0.9
+    # The gap that the unregularised law leaves is either said to be unexplained or given to an effect that is not sure.
+    assert all(c.probability < 0.9 for c in further)
+    assert further or found.gap.unexplained > 0.02
 
 
 def test_a_spring_that_hardens_is_found_where_the_joint_moves_not_around_zero(pendulum: Arm) -> None:
