@@ -7,7 +7,7 @@ use crate::number::Number;
 use crate::real::lit;
 
 /// Argument beyond which the hyperbolic tangent is 1 in double precision.
-const LARGEST: f64 = 20.0;
+const TANH_SATURATION: f64 = 20.0;
 
 /// Number of doublings of the argument, which is first divided by `2^DOUBLINGS`.
 const DOUBLINGS: i32 = 5;
@@ -22,8 +22,8 @@ const DENOMINATOR: [f64; 5] = [34_459_425.0, 16_216_200.0, 945_945.0, 13_860.0, 
 #[inline(always)]
 pub fn tanh<V: Number>(x: V) -> V {
     let c = |x: f64| V::of(lit(x));
-    let within = -((-x).larger(c(-LARGEST)));
-    let y = within.larger(c(-LARGEST)) * c(1.0 / f64::from(1 << DOUBLINGS));
+    let within = -((-x).larger(c(-TANH_SATURATION)));
+    let y = within.larger(c(-TANH_SATURATION)) * c(1.0 / f64::from(1 << DOUBLINGS));
     let square = y * y;
     let polynomial = |of: &[f64; 5]| {
         let mut sum = c(of[4]);

@@ -21,7 +21,7 @@ use nalgebra::SVector;
 
 /// Largest size, in SI units, of positions, velocities, torques and intervals that the online estimator takes: larger ones belong to no arm, and
 /// their squares would stay in filters and integrals for good.
-const LARGEST: f64 = 1e9;
+const LARGEST_INPUT: f64 = 1e9;
 /// Largest time of a sample that the online estimator takes, s; seconds since any epoch stay below.
 const LATEST: f64 = 1e11;
 
@@ -232,7 +232,7 @@ impl<T: Real, A: Arm<T, N, P>, S: Columns<T, N, P, R>, const N: usize, const P: 
         dq: Option<&SVector<T, N>>,
         tau: &SVector<T, N>,
     ) -> bool {
-        let limit: T = lit(LARGEST);
+        let limit: T = lit(LARGEST_INPUT);
         let possible = |x: &SVector<T, N>, limit: T| x.iter().fold(true, |all, x| all & (x.abs() <= limit));
         let mut fine = possible(q, limit) & possible(tau, limit) & (t.abs() <= lit(LATEST));
         if let Some(dq) = dq {

@@ -22,7 +22,7 @@ const CROSSWISE: &str = "effects fitted to the training logs did not explain the
      from and judged on by turns";
 
 /// Probability, 0 to 1, from which an external disturbance counts as named.
-const NAMED: f64 = 0.5;
+const NAMED_DISTURBANCE: f64 = 0.5;
 
 /// Diagnoses the gap between an arm and its logs; `observer` receives the progress and may cancel the diagnosis.
 pub fn diagnose(
@@ -87,7 +87,7 @@ impl Request<'_> {
         first: &Conclusion<N, P>,
     ) -> Result<Option<(DiagnosisContext<A, N, P>, Conclusion<N, P>)>, DiagnoseError> {
         let Options { max_causes, seed, horizon, .. } = *self.options;
-        let pushed = first.disturbances.iter().any(|e| e.probability > NAMED);
+        let pushed = first.disturbances.iter().any(|e| e.probability > NAMED_DISTURBANCE);
         if !(first.attribution.is_unexplained() || pushed)
             || !plain.holdout_shows_more(first.without_disturbances())
         {

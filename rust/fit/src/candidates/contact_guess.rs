@@ -9,22 +9,22 @@ use crate::predict::residual_torque::{InverseDynamicsResidual, inverse_dynamics_
 use armgap_core::arm::Arm;
 
 /// Half width, in samples, of the local cubic from which accelerations are taken; small because an impact is short.
-const HALF_WIDTH: usize = 3;
+const ACCELERATION_HALF_WIDTH: usize = 3;
 
 /// Fewest samples beyond a joint limit for a guess of the limit's stiffness.
-const FEWEST: usize = 5;
+const FEWEST_CONTACT_SAMPLES: usize = 5;
 
 /// Growth factor of the number of samples beyond a joint limit, from one tried position of the limit to the next.
 const GROWTH: f64 = 1.15;
 
 /// Largest part of a joint's samples that may lie beyond a joint limit.
-const MOST: f64 = 0.8;
+const MAX_CONTACT_SHARE: f64 = 0.8;
 
 /// Least part of the squared residual torque beyond a joint limit that the limit's spring and damper must explain.
-const EXPLAINS: f64 = 0.3;
+const CONTACT_EXPLAINED_SHARE: f64 = 0.3;
 
 /// Speed below which friction is regularised in the search for contacts, relative to the RMS speed of the slowest joint.
-const SLOW: f64 = 0.02;
+const REGULARISATION_SPEED: f64 = 0.02;
 
 /// Guess of a contact: position (rad or m), stiffness (N m/rad or N/m) and damping (N m s/rad or N s/m).
 pub type ContactGuess = [f64; 3];
@@ -48,10 +48,12 @@ pub fn contact_guesses<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     model: &Hypothesis<P>,
     speed: &[f64; N],
 ) -> [Vec<ContactGuess>; N] {
-    let slow = SLOW * speed.iter().copied().fold(f64::INFINITY, f64::min);
+    let slow = REGULARISATION_SPEED * speed.iter().copied().fold(f64::INFINITY, f64::min);
     let rows: Vec<InverseDynamicsResidual<N>> = tracks
         .iter()
-        .filter_map(|track| inverse_dynamics_residuals(arm, track, model, &track.pushes, HALF_WIDTH, slow))
+        .filter_map(|track| {
+            inverse_dynamics_residuals(arm, track, model, &track.pushes, ACCELERATION_HALF_WIDTH, slow)
+        })
         .flatten()
         .collect();
     let of = |j: usize| {
@@ -79,8 +81,10 @@ fn both(samples: &mut [ContactSample], side: f64) -> Vec<ContactGuess> {
 /// Contact on one side of zero (`side` = 1 or -1) whose spring and damper explain most of a joint's squared residual torque.
 fn hinge(samples: &mut [ContactSample], side: f64) -> Option<ContactGuess> {
     samples.sort_by(|a, b| (side * b.q).total_cmp(&(side * a.q)));
-    let most = (MOST * samples.len() as f64) as usize;
-    let counts = std::iter::successors(Some(FEWEST), |n| Some(((*n as f64 * GROWTH) as usize).max(n + 1)));
+    let most = (MAX_CONTACT_SHARE * samples.len() as f64) as usize;
+    let counts = std::iter::successors(Some(FEWEST_CONTACT_SAMPLES), |n| {
+        Some(((*n as f64 * GROWTH) as usize).max(n + 1))
+    });
     let tried = counts.take_while(|n| *n < most).filter_map(|n| {
         let position = samples.get(n).map(|s| s.q).filter(|q| q * side > 0.0)?;
         let (beyond, _) = samples.split_at(n);
@@ -102,7 +106,7 @@ fn spring(beyond: &[ContactSample], position: f64, side: f64) -> Option<([f64; 2
     let both = [(dy * vv - vy * dv) / determinant, (vy * dd - dy * dv) / determinant];
     let [stiffness, damping] = if both[1] > 0.0 { both } else { [dy / dd, 0.0] };
     let gain = stiffness * dy + damping * vy;
-    (stiffness > 0.0 && gain > EXPLAINS * yy).then_some(([stiffness, damping], gain))
+    (stiffness > 0.0 && gain > CONTACT_EXPLAINED_SHARE * yy).then_some(([stiffness, damping], gain))
 }
 
 #[cfg(test)]

@@ -16,7 +16,7 @@ use rayon::prelude::*;
 const RESOLUTION: f64 = 0.5;
 
 /// Fewest cycles of ripple over a joint's travel in the periodogram; ripple with fewer cycles resembles gravity and has fixed initial guesses.
-const FEWEST: f64 = 2.0;
+const FEWEST_CYCLES: f64 = 2.0;
 
 /// Largest phase advance of ripple per sample at the joint's RMS speed, rad.
 const FASTEST: f64 = 2.5;
@@ -56,12 +56,12 @@ pub fn periodogram_peaks<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     }
     let unit = std::f64::consts::TAU / travel;
     let highest = FASTEST / (problem.scales.speed[j] * problem.scales.period) / unit;
-    let points = (((highest - FEWEST) / RESOLUTION).max(0.0) as usize).min(MOST_POINTS);
+    let points = (((highest - FEWEST_CYCLES) / RESOLUTION).max(0.0) as usize).min(MOST_POINTS);
     let residual = problem.residual(base);
     let paths = paths(problem, base, &residual, j);
     let level = Level::detect();
     let batch = |group: usize| {
-        let first = unit * (FEWEST + RESOLUTION * (group * BATCH) as f64);
+        let first = unit * (FEWEST_CYCLES + RESOLUTION * (group * BATCH) as f64);
         level.run(Spectrum { paths: &paths, first, step: unit * RESOLUTION })
     };
     let groups: Vec<[SpectralPeak; BATCH]> = (0..points.div_ceil(BATCH)).into_par_iter().map(batch).collect();

@@ -3,7 +3,7 @@
 use super::residual::LOW_PASS;
 
 /// Least distance in time between the centres of two Gaussian pulses on one joint, s.
-const APART: f64 = 0.3;
+const MIN_PULSE_SEPARATION: f64 = 0.3;
 
 /// Gaussian pulse of residual torque on one joint.
 #[derive(Debug, Clone, Copy)]
@@ -56,7 +56,7 @@ impl Bell {
 
     /// Whether two pulses lie on one joint and too close in time to be two pushes.
     pub fn touches(&self, other: &Self) -> bool {
-        self.joint == other.joint && (self.time - other.time).abs() < APART
+        self.joint == other.joint && (self.time - other.time).abs() < MIN_PULSE_SEPARATION
     }
 }
 

@@ -12,7 +12,7 @@ use armgap_core::arm::Arm;
 use nalgebra::{DMatrix, DVector, Vector3};
 
 /// Largest distance in time, s, from a push's Gaussian pulse to a window that takes part in the fit of the push.
-const AROUND: f64 = 0.25;
+const MAX_WINDOW_DISTANCE: f64 = 0.25;
 
 /// Longest duration of a fitted push, s.
 const LONGEST: f64 = 2.5;
@@ -25,7 +25,7 @@ const HELPS: f64 = 0.01;
 const HELPS_OWN: f64 = 0.02;
 
 /// Least share that a push must explain of the cost of the windows that it touches before its size by output error is believed.
-const EXPLAINS: f64 = 0.5;
+const PUSH_EXPLAINED_SHARE: f64 = 0.5;
 
 /// Largest shift of a push's time by the output-error fit, relative to the push's duration.
 const MOVED: f64 = 0.3;
@@ -37,19 +37,19 @@ const MOVED_LEAST: f64 = 0.1;
 const CHANGED: f64 = 1.5;
 
 /// Largest number of Levenberg-Marquardt steps in the fit of a push.
-const ITERATIONS: usize = 12;
+const MAX_PUSH_ITERATIONS: usize = 12;
 
 /// Largest number of attempts at each step in the fit of a push, each with more damping.
 const ATTEMPTS: usize = 6;
 
 /// Relative decrease of the cost below which the fit of a push ends.
-const SETTLED: f64 = 1e-4;
+const PUSH_COST_TOLERANCE: f64 = 1e-4;
 
 /// Durations, s, from which the fit of a push is started besides the duration seen in the residual torque.
 const LONGER: [f64; 2] = [0.04, 0.12];
 
 /// Number of rounds in which initial states and weights of the windows are recomputed with a fitted push in the model.
-const ROUNDS: usize = 2;
+const PUSH_ROUNDS: usize = 2;
 
 /// Displacement of the model's values along a principal axis of their covariance, for sensitivities by finite difference, in standard deviations.
 const AXIS_STEP: f64 = 0.01;
@@ -123,9 +123,9 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         // Where the model leaves errors unexplained, a search from other durations would fit these errors instead of the push.
         let (mut fitted, left) = if state.remainder { touched.minimise(p) } else { touched.least(p) };
         let share = |left: f64| (bare - left) / (bare - usual.min(0.5 * bare)).max(1e-300);
-        let believed = share(left) > EXPLAINS && bare - left > least;
+        let believed = share(left) > PUSH_EXPLAINED_SHARE && bare - left > least;
         if believed && close(&fitted, &p, state.remainder) {
-            for _ in 0..ROUNDS {
+            for _ in 0..PUSH_ROUNDS {
                 touched.sample.data.tracks[0].pushes = touched.with(&fitted);
                 touched.weighting = self.weighting(&touched.sample, state.model, state.scale, state.zeros);
                 (fitted, _) = touched.minimise(fitted);
@@ -209,7 +209,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Touched<'_, A, N, P> {
     fn minimise(&self, p: Vector3<f64>) -> (Vector3<f64>, f64) {
         let (mut p, mut r) = (p, self.residual_of(&p));
         let (mut cost, mut damping) = (self.cost(&r), 1e-2);
-        for _ in 0..ITERATIONS {
+        for _ in 0..MAX_PUSH_ITERATIONS {
             let jacobian = self.jacobian(&p, &r);
             let gram =
                 self.weighting.gram(&self.sample.data, &jacobian.each_ref().map(Vec::as_slice), &r).total;
@@ -225,7 +225,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Touched<'_, A, N, P> {
                 }
                 damping *= 8.0;
             }
-            if before - cost <= SETTLED * before {
+            if before - cost <= PUSH_COST_TOLERANCE * before {
                 break;
             }
         }
@@ -299,7 +299,7 @@ fn damped_step(p: &Vector3<f64>, gram: &DMatrix<f64>, damping: f64) -> Option<Ve
 fn around<const N: usize>(sample: &WindowSet<N>, disturbance: &Disturbance) -> Dataset<N> {
     let track = &sample.data.tracks[disturbance.track];
     let [_, time, duration] = disturbance.push.p;
-    let reach = 0.75 * duration + AROUND;
+    let reach = 0.75 * duration + MAX_WINDOW_DISTANCE;
     sample
         .data
         .of_track(disturbance.track, |w| track.t[w.first] < time + reach && track.t[w.last] > time - reach)

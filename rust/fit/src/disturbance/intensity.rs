@@ -26,16 +26,16 @@ const OPEN: f64 = 100.0;
 const FIRST: f64 = 1e-2;
 
 /// Smallest random torque on a joint, relative to the joint's typical torque.
-const FAINTEST: f64 = 1e-5;
+const MIN_RANDOM_TORQUE: f64 = 1e-5;
 
 /// Ratio of intensities between the corners of the first Nelder-Mead simplex.
-const APART: f64 = 100.0;
+const SIMPLEX_RATIO: f64 = 100.0;
 
 /// Standard deviation of the deviance over the Nelder-Mead simplex that ends the search for intensities.
-const SETTLED: f64 = 0.1;
+const DEVIANCE_TOLERANCE: f64 = 0.1;
 
 /// Largest number of Nelder-Mead iterations in the search for intensities; computation time is in proportion.
-const MAX_ITERATIONS: u64 = 60;
+const MAX_INTENSITY_ITERATIONS: u64 = 60;
 
 type Matrix<const N: usize> = SMatrix<f64, N, N>;
 type Vector<const N: usize> = SVector<f64, N>;
@@ -52,7 +52,7 @@ struct PredictionErrors<const N: usize> {
     windows: Vec<(KalmanFilter<N>, Vec<PredictionError<N>>)>,
     /// Covariance of the noise of measured positions, rad^2 or m^2.
     noise: Matrix<N>,
-    /// Common logarithms of the smallest intensities ([`FAINTEST`]).
+    /// Common logarithms of the smallest intensities ([`MIN_RANDOM_TORQUE`]).
     faintest: [f64; N],
 }
 
@@ -84,7 +84,7 @@ pub fn shares<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     let unit = |part: f64| intensities(&context.scales, part);
     let mean = windows.iter().flat_map(|(_, w)| w).map(|m| m.mobility.diagonal()).sum::<Vector<N>>();
     let noise = Matrix::from_diagonal(&Vector::from(context.noise.map(|s| s * s)));
-    let misses = PredictionErrors { windows, noise, faintest: unit(FAINTEST) };
+    let misses = PredictionErrors { windows, noise, faintest: unit(MIN_RANDOM_TORQUE) };
     let likeliest = misses.likeliest(unit(FIRST));
     let fed = Vector::<N>::from_fn(|j, _| 10f64.powf(likeliest[j]) * mean[j]);
     let whole = fed.sum();
@@ -103,16 +103,19 @@ impl<const N: usize> PredictionErrors<N> {
         let corner = |i: usize| {
             let mut corner = first.to_vec();
             if i < N {
-                corner[i] += APART.log10();
+                corner[i] += SIMPLEX_RATIO.log10();
             }
             corner
         };
         let faintest = self.faintest;
         let simplex = NelderMead::new((0..=N).map(corner).collect());
         let found = simplex
-            .with_sd_tolerance(SETTLED)
+            .with_sd_tolerance(DEVIANCE_TOLERANCE)
             .and_then(|solver| {
-                Executor::new(self, solver).configure(|s| s.max_iters(MAX_ITERATIONS)).timer(false).run()
+                Executor::new(self, solver)
+                    .configure(|s| s.max_iters(MAX_INTENSITY_ITERATIONS))
+                    .timer(false)
+                    .run()
             })
             .ok()
             .and_then(|end| end.state.get_best_param().cloned());

@@ -31,7 +31,7 @@ const LAWS: [LawGuess; 2] = [
 const HALVINGS: usize = 40;
 
 /// Number of rounds in which initial states and weights of the windows are recomputed around the model with an effect in the place of pushes.
-const ROUNDS: usize = 2;
+const LAW_ROUNDS: usize = 2;
 
 /// Ratio of duration, and of peak, of a contact's half-sine pulse of torque to the rectangular pulse of torque that fits it best.
 const HALF_SINE: f64 = 1.3;
@@ -108,7 +108,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         }
         self.set_pushes(disturbances);
         let (settled, weights) = self.of_all_windows().settle(&alone.model.hypothesis, scale);
-        let pushed = self.of_all_windows().explanation(settled, &weights.training, ROUNDS);
+        let pushed = self.of_all_windows().explanation(settled, &weights.training, LAW_ROUNDS);
         let found = tried.into_iter().filter_map(|trial| {
             self.set_pushes(&trial.others);
             self.law_of(&trial, &pushed)
@@ -154,7 +154,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             trial.guesses.par_iter().map(|guess| problem.solve(&model.with(*guess), Effort::ROUGH)).collect();
         let score = |fit: &Fit<P>| pushed.weighting.total(&fit.costs) + fit.prior_cost;
         let rough = fitted.into_iter().min_by(|a, b| score(a).total_cmp(&score(b)))?;
-        let found = all.explanation(rough, &pushed.weighting, ROUNDS);
+        let found = all.explanation(rough, &pushed.weighting, LAW_ROUNDS);
         let effect = *found.fit.hypothesis.effects.last()?;
         let acts = trial.theirs.iter().any(|e| {
             let [t, q, torque] = &pushed_motion(self.track(e.place()), &e.push);

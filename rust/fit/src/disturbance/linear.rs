@@ -26,10 +26,10 @@ const DISTINCT: f64 = 0.15;
 const FIRST_SCATTER: f64 = 0.15;
 
 /// Number of rounds in which the standard deviation of the residual torque is estimated again.
-const ROUNDS: usize = 4;
+const SCATTER_ROUNDS: usize = 4;
 
 /// Prior standard deviation of a push's height relative to the typical torque of its joint.
-const LARGEST: f64 = 20.0;
+const PRIOR_PUSH_HEIGHT: f64 = 20.0;
 
 /// Result of a linear fit of model errors and Gaussian pulses to residual torques.
 pub struct Fitted {
@@ -70,7 +70,7 @@ impl<'a, const N: usize> Linear<'a, N> {
     /// leaves.
     pub fn settle(&mut self, bells: &[Bell]) -> Option<Fitted> {
         let mut fitted = self.fit(bells)?;
-        for _ in 0..ROUNDS {
+        for _ in 0..SCATTER_ROUNDS {
             self.scatter =
                 (0..N).into_par_iter().map(|j| scatter(self.residual, j, &fitted.left[j])).collect();
             fitted = self.fit(bells)?;
@@ -89,7 +89,8 @@ impl<'a, const N: usize> Linear<'a, N> {
             right[i] += precision * expected;
         }
         for (i, bell) in bells.iter().enumerate() {
-            normal[(c + i, c + i)] += (LARGEST * residual.joints[bell.joint].typical.max(1e-9)).powi(-2);
+            normal[(c + i, c + i)] +=
+                (PRIOR_PUSH_HEIGHT * residual.joints[bell.joint].typical.max(1e-9)).powi(-2);
         }
         let rows: Vec<DMatrix<f64>> = (0..N).map(|j| self.rows(j, bells)).collect();
         let weights: Vec<[Vec<f64>; 2]> = (0..N).map(|j| self.weights(j)).collect();

@@ -19,17 +19,17 @@ use rayon::prelude::*;
 const OUTLYING: f64 = 30.0;
 
 /// Least share that a push in an outlying window must explain of the cost of the windows that it touches.
-const CLEAR: f64 = 0.8;
+const OUTLYING_EXPLAINED_SHARE: f64 = 0.8;
 
 /// Least impulse of a push in an outlying window, in standard deviations of the impulse: the window of a less certain push is outlying for another
 /// reason, such as a wrong instant at which a joint comes to rest.
-const KNOWN: f64 = 5.0;
+const OUTLYING_IMPULSE: f64 = 5.0;
 
 /// Durations of pushes that are tried in an outlying window, s.
 const DURATIONS: [f64; 3] = [0.01, 0.05, 0.15];
 
 /// Spacing of the times at which pushes are tried in an outlying window, s.
-const STEP: f64 = 0.02;
+const TRIAL_TIME_STEP: f64 = 0.02;
 
 /// Impulse of a push, relative to its typical size, for derivatives by finite difference.
 const SLIGHT: f64 = 1e-6;
@@ -47,9 +47,9 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         while disturbances.len() < MAX_PUSHES {
             let rough = self.in_worst_window(place, state, disturbances);
             let sized = rough.and_then(|rough| self.sized(rough, state, own, disturbances));
-            let Some(disturbance) =
-                sized.filter(|e| e.share > CLEAR && e.push.p[0].abs() > KNOWN * e.sigma[0])
-            else {
+            let Some(disturbance) = sized.filter(|e| {
+                e.share > OUTLYING_EXPLAINED_SHARE && e.push.p[0].abs() > OUTLYING_IMPULSE * e.sigma[0]
+            }) else {
                 return;
             };
             disturbances.push(disturbance);
@@ -92,8 +92,9 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let tried: Vec<(usize, f64, f64)> = (0..N)
             .flat_map(|joint| DURATIONS.map(|duration| (joint, duration)))
             .flat_map(|(joint, duration)| {
-                let count = ((to - from + duration) / STEP).ceil() as usize;
-                (0..=count).map(move |i| (joint, duration, from - 0.5 * duration + i as f64 * STEP))
+                let count = ((to - from + duration) / TRIAL_TIME_STEP).ceil() as usize;
+                (0..=count)
+                    .map(move |i| (joint, duration, from - 0.5 * duration + i as f64 * TRIAL_TIME_STEP))
             })
             .collect();
         let gains: Vec<(f64, EffectInstance)> = tried

@@ -37,7 +37,7 @@ const REMAINDER_DOUBT: f64 = 0.5;
 const MUCH_WORSE: f64 = 1.5;
 
 /// Least impulse of a push, in standard deviations of the impulse, for it to differ significantly from zero.
-const KNOWN: f64 = 2.0;
+const SIGNIFICANT_IMPULSE: f64 = 2.0;
 
 /// Shortest recording in which pushes are looked for, s.
 const SHORTEST_LOG: f64 = 1.5;
@@ -283,7 +283,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
 impl Disturbance {
     /// Whether the push's impulse is significantly different from zero.
     fn is_known(&self) -> bool {
-        self.clarity() > KNOWN
+        self.clarity() > SIGNIFICANT_IMPULSE
     }
 
     /// Impulse of the push in standard deviations.

@@ -48,7 +48,7 @@ const LAG: f64 = 0.01;
 const LOW_SPEED: f64 = 0.4;
 
 /// Least number of samples of a log in which pushes are looked for.
-const FEWEST: usize = 100;
+const FEWEST_LOG_SAMPLES: usize = 100;
 
 /// Length of the moving mean of the motion's activity (squared torques, rates of torque, accelerations and speeds), s.
 const ACTIVE: f64 = 0.1;
@@ -104,7 +104,7 @@ impl<const N: usize> Residual<N> {
         let speed = rms_speeds(track);
         let rows = rows(arm, track, model, &slow_speeds(track, &speed))?;
         let t: Vec<f64> = rows.iter().map(|r| r.t).collect();
-        if t.len() < FEWEST {
+        if t.len() < FEWEST_LOG_SAMPLES {
             return None;
         }
         let step = GRID.max(GRID_SAMPLES * track.period());

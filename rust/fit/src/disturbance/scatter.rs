@@ -20,13 +20,13 @@ const QUIET: f64 = 0.5;
 const VIOLENT: f64 = 8.0;
 
 /// Half width of the stretch of a log over which the local median of the residual torque's size is taken, s.
-const AROUND: f64 = 1.0;
+const MEDIAN_HALF_WIDTH: f64 = 1.0;
 
 /// Number of grid points above which the local median of the residual torque's size is used.
-const FEWEST: usize = 40;
+const FEWEST_MEDIAN_POINTS: usize = 40;
 
 /// Ratio of the standard deviation to the median absolute value of a normal variable.
-const NORMAL: f64 = 1.4826;
+const MAD_TO_SIGMA: f64 = 1.4826;
 
 /// Least standard deviation of the residual torque, relative to the joint's typical torque.
 const FLOOR: f64 = 0.002;
@@ -36,15 +36,15 @@ pub fn scatter<const N: usize>(residual: &Residual<N>, j: usize, left: &[f64]) -
     let moves: Vec<bool> = residual.joints[j].rest.iter().map(|r| *r < 0.3).collect();
     let of_moving = |x: &[f64]| x.iter().zip(&moves).filter(|(_, m)| **m).map(|(x, _)| x.abs()).collect();
     let floor = FLOOR * residual.joints[j].typical;
-    let typical = (NORMAL * median(of_moving(left))).max(floor).max(1e-12);
+    let typical = (MAD_TO_SIGMA * median(of_moving(left))).max(floor).max(1e-12);
     let by_activity = by_activity(residual, j, left, &moves, typical);
-    let half = (AROUND / residual.step).round() as usize;
+    let half = (MEDIAN_HALF_WIDTH / residual.step).round() as usize;
     let mut local = typical;
     let at = |i: usize| {
         if i.is_multiple_of(10) {
             let range = i.saturating_sub(half)..(i + half).min(left.len());
             let near: Vec<f64> = range.filter(|&k| moves[k]).map(|k| left[k].abs()).collect();
-            local = if near.len() > FEWEST { NORMAL * median(near) } else { typical };
+            local = if near.len() > FEWEST_MEDIAN_POINTS { MAD_TO_SIGMA * median(near) } else { typical };
         }
         (local * local + by_activity[i] + floor * floor).sqrt()
     };

@@ -12,7 +12,7 @@ use crate::log::track::median;
 use rayon::prelude::*;
 
 /// Standard deviations of the Gaussian pulses looked for, after the low-pass, s.
-const WIDTHS: [f64; 7] = [0.045, 0.055, 0.07, 0.09, 0.115, 0.145, 0.18];
+const PULSE_WIDTHS: [f64; 7] = [0.045, 0.055, 0.07, 0.09, 0.115, 0.145, 0.18];
 
 /// Spacing of the times of pulses tried in the coarse search, s.
 const COARSE: f64 = 0.02;
@@ -21,23 +21,23 @@ const COARSE: f64 = 0.02;
 const FINE: f64 = 0.01;
 
 /// Half range of times of the fine search around a pulse, s.
-const REFINED: f64 = 0.08;
+const FINE_HALF_RANGE: f64 = 0.08;
 
 /// Size, in standard deviations, from which a pulse is tried as a push.
-const TRIED: f64 = 2.5;
+const TRIED_PULSE: f64 = 2.5;
 
 /// Size, in standard deviations, from which a pulse is a push where the model describes the arm.
-const LIKELY: f64 = 5.0;
+const LIKELY_PULSE: f64 = 5.0;
 
 /// Size, in standard deviations, from which a pulse is a push where the model leaves errors unexplained and the pulse exceeds the joint's friction.
 const ABOVE_REMAINDER: f64 = 3.9;
 
 /// Size, in standard deviations, from which a pulse is a push where the model leaves errors unexplained, whatever the joint's friction.
-const CERTAIN: f64 = 12.0;
+const CERTAIN_PULSE: f64 = 12.0;
 
 /// Size, in standard deviations, that the largest pulse of a log must have for pushes to be looked for, while the scatter of the residual torque
 /// still contains all pulses. In a log without such a pulse there is no push, and there are no pushes that hide each other.
-const STANDS_OUT: f64 = 3.6;
+const PROMINENT_PULSE: f64 = 3.6;
 
 /// Least height of a push relative to the joint's friction at rest, where the model leaves errors unexplained.
 const ABOVE_FRICTION: f64 = 1.2;
@@ -59,7 +59,7 @@ pub struct Found {
 impl Found {
     /// Removes the pulse with index `bell` and keeps its size as that of a pulse that is no push.
     fn dismiss(&mut self, bell: usize) {
-        self.rest = f64::max(self.rest, self.bells.remove(bell).z.min(LIKELY));
+        self.rest = f64::max(self.rest, self.bells.remove(bell).z.min(LIKELY_PULSE));
     }
 }
 
@@ -73,10 +73,10 @@ struct Search<'a, const N: usize> {
 
 /// Looks for pushes in the residual torque of a log; `remainder` tells whether the model leaves more error unexplained than noise.
 pub fn search<const N: usize>(residual: &Residual<N>, remainder: bool) -> Option<Found> {
-    let chance = vec![vec![1.0; WIDTHS.len()]; N];
+    let chance = vec![vec![1.0; PULSE_WIDTHS.len()]; N];
     let mut search = Search { linear: Linear::new(residual), remainder, chance };
     let bells = search.gather()?;
-    let mut found = Found { bells, rest: TRIED };
+    let mut found = Found { bells, rest: TRIED_PULSE };
     search.drop_doubtful(&mut found)?;
     if remainder {
         search.drop_aided(&mut found)?;
@@ -91,11 +91,11 @@ impl<const N: usize> Search<'_, N> {
         loop {
             let fitted = self.linear.settle(&bells)?;
             let largest = self.scan(&fitted);
-            if bells.is_empty() && largest.is_none_or(|b| b.z < STANDS_OUT) {
+            if bells.is_empty() && largest.is_none_or(|b| b.z < PROMINENT_PULSE) {
                 return Some(bells);
             }
             bells = self.refine(bells)?;
-            let Some(next) = largest.filter(|b| b.z > TRIED) else { return Some(bells) };
+            let Some(next) = largest.filter(|b| b.z > TRIED_PULSE) else { return Some(bells) };
             if bells.len() == MAX_PUSHES {
                 return Some(bells);
             }
@@ -127,7 +127,7 @@ impl<const N: usize> Search<'_, N> {
             let unaided = |i| if self.stands(&bells[i]) { self.unaided(bells, i) } else { Some(0.0) };
             let sizes: Vec<f64> = (0..bells.len()).map(unaided).collect::<Option<_>>()?;
             let weakest = least(&sizes)?;
-            if sizes[weakest] > STANDS_OUT {
+            if sizes[weakest] > PROMINENT_PULSE {
                 break;
             }
             found.dismiss(weakest);
@@ -147,7 +147,11 @@ impl<const N: usize> Search<'_, N> {
     /// Whether a pulse is large enough to count as a push.
     fn stands(&self, bell: &Bell) -> bool {
         let above = bell.height.abs() > ABOVE_FRICTION * self.linear.residual.joints[bell.joint].holding;
-        if self.remainder { bell.z > CERTAIN || (bell.z > ABOVE_REMAINDER && above) } else { bell.z > LIKELY }
+        if self.remainder {
+            bell.z > CERTAIN_PULSE || (bell.z > ABOVE_REMAINDER && above)
+        } else {
+            bell.z > LIKELY_PULSE
+        }
     }
 
     /// Size, in standard deviations, of the pulse with index `i` in a fit of the other pulses alone, so that its own torque enlarges the standard
@@ -163,9 +167,9 @@ impl<const N: usize> Search<'_, N> {
     fn scan(&mut self, fitted: &Fitted) -> Option<Bell> {
         let moves = |j: usize| self.linear.moving[j].iter().sum::<f64>() * self.linear.residual.step > MOVES;
         let kinds: Vec<(usize, usize)> =
-            (0..N).filter(|&j| moves(j)).flat_map(|j| (0..WIDTHS.len()).map(move |w| (j, w))).collect();
+            (0..N).filter(|&j| moves(j)).flat_map(|j| (0..PULSE_WIDTHS.len()).map(move |w| (j, w))).collect();
         let scanned: Vec<(f64, Option<Bell>)> =
-            kinds.par_iter().map(|(joint, w)| self.scan_kind(fitted, *joint, WIDTHS[*w])).collect();
+            kinds.par_iter().map(|(joint, w)| self.scan_kind(fitted, *joint, PULSE_WIDTHS[*w])).collect();
         let mut largest: Option<Bell> = None;
         for ((joint, w), (chance, best)) in kinds.into_iter().zip(scanned) {
             self.chance[joint][w] = chance;
@@ -219,8 +223,8 @@ impl<const N: usize> Search<'_, N> {
     fn best_near(&self, fitted: &Fitted, bell: &Bell, stands_out: bool) -> Bell {
         let mut best = Bell { z: -1.0, ..*bell };
         let mut largest = -1.0;
-        let steps = (REFINED / FINE).round() as i32;
-        for (w, &width) in WIDTHS.iter().enumerate() {
+        let steps = (FINE_HALF_RANGE / FINE).round() as i32;
+        for (w, &width) in PULSE_WIDTHS.iter().enumerate() {
             let (from, to) = self.linear.span(width);
             let chance = self.chance[bell.joint][w];
             for step in -steps..=steps {

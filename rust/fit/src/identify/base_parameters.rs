@@ -17,7 +17,7 @@ const INDEPENDENT: f64 = 1e-4;
 /// Part of the longest regressor column's length below which a column counts as rounding.
 const VISIBLE: f64 = 1e-9;
 /// Share of the largest factor of a combination of parameters below which a factor is rounding of double precision.
-const ROUNDING: f64 = 1e-12;
+const FACTOR_ROUNDING: f64 = 1e-12;
 /// Random states per parameter of one joint in the stacked regressor.
 const STATES: usize = 4;
 /// Order in which the ten inertial parameters of a link are examined for independence.
@@ -157,7 +157,7 @@ impl Basis {
         }
         // Coefficients as small as rounding errors are set to zero.
         let largest = x.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
-        x.iter().map(|x| if x.abs() <= ROUNDING * largest.max(1.0) { 0.0 } else { *x }).collect()
+        x.iter().map(|x| if x.abs() <= FACTOR_ROUNDING * largest.max(1.0) { 0.0 } else { *x }).collect()
     }
 }
 

@@ -19,10 +19,10 @@ use rayon::prelude::*;
 const RELATIVE_STEP: f64 = 1e-6;
 
 /// Largest number of Levenberg-Marquardt iterations.
-const MAX_ITERATIONS: usize = 50;
+const MAX_OUTPUT_ERROR_ITERATIONS: usize = 50;
 
 /// Relative change of all parameters by a step below which the search ends.
-const SETTLED: f64 = 1e-8;
+const STEP_TOLERANCE: f64 = 1e-8;
 
 /// Largest number of attempts at a step, each with more damping.
 const MAX_ATTEMPTS: usize = 8;
@@ -127,15 +127,17 @@ impl<A, const N: usize> OutputErrorProblem<'_, A, N> {
         loop {
             let gradient;
             (normal, gradient) = normal_equations(&self.sensitivities(&at, &steps), &at.residual);
-            if settled || iterations == MAX_ITERATIONS {
+            if settled || iterations == MAX_OUTPUT_ERROR_ITERATIONS {
                 break;
             }
             iterations += 1;
             let mut found = None;
             for _ in 0..MAX_ATTEMPTS {
                 let theta = moved::<A, N, P>(&at.theta, &normal, &gradient, damping);
-                settled =
-                    theta.iter().zip(&at.theta).all(|(a, b)| (a - b).abs() <= SETTLED * b.abs().max(1e-3));
+                settled = theta
+                    .iter()
+                    .zip(&at.theta)
+                    .all(|(a, b)| (a - b).abs() <= STEP_TOLERANCE * b.abs().max(1e-3));
                 found = Some(self.point(theta)).filter(|there| there.cost < at.cost);
                 if found.is_some() || settled {
                     break;

@@ -14,7 +14,7 @@ use armgap_core::transmission::Sides;
 const MAX_ROUNDS: usize = 5;
 
 /// Ratio of successive residual scales of every joint below which re-weighting ends.
-const SETTLED: f64 = 1.1;
+const SETTLED_SCALE_RATIO: f64 = 1.1;
 
 /// Rounds of alternating estimation of encoder zeros and parameters, to find how much of the training cost encoder zeros explain.
 const ZERO_ROUNDS: usize = 2;
@@ -284,7 +284,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             hypothesis = fit.hypothesis.clone();
             let change = (0..N).map(|j| (next[j] / scale[j]).max(scale[j] / next[j])).fold(1.0, f64::max);
             scale = next;
-            change < SETTLED || round == MAX_ROUNDS
+            change < SETTLED_SCALE_RATIO || round == MAX_ROUNDS
         });
         let training = self.training_weighting(&hypothesis, scale, &zeros, with_zeros);
         let zeros = self.zeros_beside(&self.holdout, &hypothesis, scale, &training.zeros);

@@ -26,7 +26,7 @@ const INDISPENSABLE: f64 = 1e3;
 const JITTER: f64 = 1e-12;
 
 /// Degrees of freedom beyond which a Student distribution is taken as normal.
-const NORMAL: f64 = 1e3;
+const NORMAL_DEGREES_OF_FREEDOM: f64 = 1e3;
 
 /// Quantile of the standard normal distribution for a two-sided 95 % interval.
 pub const NORMAL_95: f64 = 1.96;
@@ -45,7 +45,7 @@ impl ParameterCovariance {
     fn unknown(k: usize) -> Self {
         Self {
             matrix: DMatrix::from_diagonal_element(k, k, f64::INFINITY),
-            degrees_of_freedom: vec![NORMAL; k],
+            degrees_of_freedom: vec![NORMAL_DEGREES_OF_FREEDOM; k],
         }
     }
 
@@ -56,7 +56,8 @@ impl ParameterCovariance {
         let precision = |i: usize| gram.total[(i, i)] + prior_precision[i];
         let (seen, unseen): (Vec<usize>, Vec<usize>) = (0..k).partition(|&i| precision(i) > 0.0);
         let Some(known) = Determined::new(gram, prior_precision, &seen) else { return Self::unknown(k) };
-        let mut spread = Self { matrix: DMatrix::zeros(k, k), degrees_of_freedom: vec![NORMAL; k] };
+        let mut spread =
+            Self { matrix: DMatrix::zeros(k, k), degrees_of_freedom: vec![NORMAL_DEGREES_OF_FREEDOM; k] };
         for (a, &i) in seen.iter().enumerate() {
             for (b, &j) in seen.iter().enumerate() {
                 spread.matrix[(i, j)] = known.covariance[(a, b)] / (precision(i) * precision(j)).sqrt();
@@ -111,8 +112,10 @@ impl Determined {
                 covariance += &inverse * product * relative_cost(gram, w);
             }
         }
-        let degrees_of_freedom =
-            sums.iter().map(|[all, squares]| (all * all / squares).clamp(1.0, NORMAL)).collect();
+        let degrees_of_freedom = sums
+            .iter()
+            .map(|[all, squares]| (all * all / squares).clamp(1.0, NORMAL_DEGREES_OF_FREEDOM))
+            .collect();
         Some(Self { covariance, degrees_of_freedom })
     }
 }

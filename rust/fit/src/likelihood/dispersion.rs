@@ -17,7 +17,7 @@ const DETERMINED: f64 = 0.5;
 const OWN: f64 = 0.5;
 
 /// Largest dispersion factor of a standard deviation.
-const MOST: f64 = 1e3;
+const MAX_DISPERSION: f64 = 1e3;
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
     /// Widens the standard deviations of a fit by its dispersion factor against a fit of the same model to the holdout; returns the holdout fit.
@@ -31,7 +31,9 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let shared = known.iter().sum::<f64>() / known.len() as f64;
         let factor: Vec<f64> = squares
             .iter()
-            .map(|own| shared.max(own.unwrap_or(0.0) * OWN).clamp(1.0, MOST * MOST).sqrt())
+            .map(|own| {
+                shared.max(own.unwrap_or(0.0) * OWN).clamp(1.0, MAX_DISPERSION * MAX_DISPERSION).sqrt()
+            })
             .collect();
         // The standard deviation of an arm parameter is not widened beyond the arm file's, which holds without any log.
         let widest = |i: usize| if i < P { self.prior.sigma[i] } else { f64::INFINITY };

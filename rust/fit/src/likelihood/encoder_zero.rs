@@ -18,7 +18,7 @@ const LARGEST_SPREAD: f64 = 0.1;
 
 /// Number of iterations of expectation maximisation: a non-zero standard deviation of the encoder zeros converges in tens of them, one that vanishes
 /// approaches zero in hundreds.
-const ROUNDS: usize = 300;
+const EM_ITERATIONS: usize = 300;
 
 /// Prior odds that a joint whose encoder zeros differ between recordings also has an encoder offset shared by all of them. With odds of 1, the mean
 /// zero of three or four recordings is named as an offset with probability 0.67 and 0.75 on arms without an offset; with 0.01, an offset of four
@@ -104,7 +104,7 @@ impl<const N: usize> EncoderZeros<N> {
     /// estimated at the joints marked in `has_mean` and zero at the others.
     fn distribution(evidence: &[Evidence<N>], has_mean: [bool; N]) -> Self {
         let mut found = Self { spread: [LARGEST_SPREAD; N], ..Self::none() };
-        for _ in 0..ROUNDS {
+        for _ in 0..EM_ITERATIONS {
             let (common, of_common) = found.shared(evidence, has_mean);
             found.common = common;
             let expected = |e: &Evidence<N>| {

@@ -7,7 +7,7 @@ use armgap_core::arm::Arm;
 
 /// Part of a Jacobian column's squared length that is independent of the other columns, below which the column counts as collinear and no columns of
 /// a neighbouring point are reused.
-const APART: f64 = 0.05;
+const COLLINEAR_BELOW: f64 = 0.05;
 
 /// Jacobian columns of the free values, the first ones possibly reused from a neighbouring point, and their inner products.
 pub(crate) struct Jacobian<'a> {
@@ -58,7 +58,7 @@ impl<'a> Jacobian<'a> {
         let normal = self.gram.total.view((0, 0), (count, count)).into_owned();
         scaled_inverse(&normal).is_some_and(|inverse| {
             let left = |i: usize| 1.0 / (inverse[(i, i)] * normal[(i, i)]);
-            (self.reused_columns()..count).all(|i| normal[(i, i)] <= 0.0 || left(i) > APART)
+            (self.reused_columns()..count).all(|i| normal[(i, i)] <= 0.0 || left(i) > COLLINEAR_BELOW)
         })
     }
 

@@ -29,7 +29,7 @@ pub struct Scales<const N: usize> {
 }
 
 /// Largest deviation of an effect's parameter from its centre in a fit, relative to the parameter's typical size; no arm has larger values.
-const LARGEST: f64 = 50.0;
+const LARGEST_DEVIATION: f64 = 50.0;
 
 /// Longest admissible time constant of an effect, in sample periods.
 const LONGEST_TIME: f64 = 1000.0;
@@ -146,7 +146,7 @@ impl<const N: usize> Scales<N> {
             Quantity::Time => LONGEST_TIME,
             Quantity::Speed => FASTEST,
             Quantity::ContactStiffness | Quantity::ContactDamping => HARDEST,
-            _ => LARGEST,
+            _ => LARGEST_DEVIATION,
         };
         most * self.size(quantity, j)
     }

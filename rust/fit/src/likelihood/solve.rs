@@ -19,10 +19,10 @@ use rayon::prelude::*;
 const RELATIVE_STEP: f64 = 1e-6;
 
 /// Largest error of the predicted decrease of the cost, relative to the decrease that ends a search, at which the Jacobian is reused.
-const FORESEEN: f64 = 0.5;
+const MAX_DECREASE_ERROR: f64 = 0.5;
 
 /// Decrease of the cost predicted by a reused Jacobian, relative to the decrease that ends a search, below which the search ends.
-const LEAST: f64 = 0.1;
+const MIN_PREDICTED_DECREASE: f64 = 0.1;
 
 /// Largest error of the predicted decrease of the cost, relative to the predicted decrease, at which Jacobian columns of a neighbouring hypothesis
 /// are reused again.
@@ -208,7 +208,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> FitProblem<'_, A, N, P> 
                 let values = inside(&now, step(&normal, &gradient, damping, &now, &lower, &upper), &lower, P);
                 let change = DVector::from_fn(now.len(), |i, _| values[i] - now[i]);
                 let foreseen = change.dot(&(2.0 * &gradient - &normal * &change));
-                if jacobian.is_reused && foreseen < LEAST * effort.enough * at.cost() {
+                if jacobian.is_reused && foreseen < MIN_PREDICTED_DECREASE * effort.enough * at.cost() {
                     break 'search;
                 }
                 let trial = Linearisation::new(self, at.hypothesis.with_values(&values));
@@ -228,7 +228,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> FitProblem<'_, A, N, P> 
                 None if !jacobian.is_current() => jacobian = Jacobian::new(self, &at),
                 Some((fall, foreseen)) if fall > enough => {
                     let missed = (fall - foreseen).abs();
-                    if effort.reuse_jacobian && missed < FORESEEN * enough {
+                    if effort.reuse_jacobian && missed < MAX_DECREASE_ERROR * enough {
                         jacobian.reuse_at(self, &at);
                         continue;
                     }

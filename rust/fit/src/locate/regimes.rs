@@ -14,7 +14,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 /// Half width, in samples, of the local cubic whose curvature is the residual acceleration.
-const HALF_WIDTH: usize = 8;
+const CURVATURE_HALF_WIDTH: usize = 8;
 
 /// Time from a sign change of a joint's velocity within which the joint counts as near a reversal, s.
 const REVERSAL_S: f64 = 0.05;
@@ -23,7 +23,7 @@ const REVERSAL_S: f64 = 0.05;
 const BINS: usize = 6;
 
 /// Ratio of the mean square residual torque in a regime to that of the joint over all samples from which the regime stands out.
-const STANDS_OUT: f64 = 1.6;
+const REGIME_CONTRAST: f64 = 1.6;
 
 /// State and residual torque of all joints at one sample.
 #[derive(Debug, Clone, Copy)]
@@ -58,13 +58,13 @@ pub fn residual_torques<A: Arm<f64, N, P>, const N: usize, const P: usize, const
         .map(|window| {
             let track = &data.tracks[window.track];
             let times = &track.t[window.first + 1..=window.last];
-            let rows = if times.len() < 2 * HALF_WIDTH + 1 { 0..0 } else { 0..times.len() };
+            let rows = if times.len() < 2 * CURVATURE_HALF_WIDTH + 1 { 0..0 } else { 0..times.len() };
             let residual = |i: usize, h: usize| {
                 let k = window.first + 1 + i;
                 let rows = &predicted[h][window.range()];
                 let curvature = SVector::<f64, N>::from_fn(|j, _| {
                     let error = |r: usize| track.q[window.first + 1 + r][j] - rows[r * N + j];
-                    local_cubic(times, error, i, HALF_WIDTH).ddq
+                    local_cubic(times, error, i, CURVATURE_HALF_WIDTH).ddq
                 });
                 arm.inertia(&hypotheses[h].theta, &track.q[k]) * curvature
             };
@@ -292,7 +292,7 @@ fn standing_out(j: usize, share: f64, regimes: &[Regime]) -> Location {
         let mean = pairs().map(|(r, n)| r * r * *n as f64).sum::<f64>() / samples.max(1) as f64;
         for (b, (rms, count)) in pairs().enumerate() {
             let contrast = rms * rms / mean.max(1e-300);
-            if *count * 20 >= samples && contrast > best.map_or(STANDS_OUT, |x| x.0) {
+            if *count * 20 >= samples && contrast > best.map_or(REGIME_CONTRAST, |x| x.0) {
                 best = Some((contrast, regime, b));
             }
         }

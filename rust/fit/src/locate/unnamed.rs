@@ -26,7 +26,7 @@ const LOW_PASS_S: f64 = 0.02;
 const GRID_S: f64 = 0.02;
 
 /// Share of the time around a point at which a joint may be at rest, with undetermined friction, from which the point is left out of the regression.
-const AT_REST: f64 = 0.1;
+const AT_REST_SHARE: f64 = 0.1;
 
 /// Length of the blocks over which gains in prediction are taken as independent, s: residual torques are correlated over 0.05 to 0.3 s.
 const BLOCK_S: f64 = 1.0;
@@ -37,14 +37,14 @@ const CORRELATED: f64 = 10.0;
 
 /// Least decrease of the squared residual torque of left-out logs by a table, in standard deviations of this decrease. Where the torque does not
 /// depend on the variable, a table predicts left-out logs worse than no table.
-const CERTAIN: f64 = 2.0;
+const CERTAIN_TABLE: f64 = 2.0;
 
 /// Least share of the residual torque's variance beyond noise that a table must explain.
-const MATTERS: f64 = 0.15;
+const TABLE_EXPLAINED_SHARE: f64 = 0.15;
 
 /// Largest number of tables for one joint. No table is fitted where the mean square of the residual torque is at most twice what noise of the
 /// positions contributes.
-pub const MOST: usize = 3;
+pub const MAX_TABLES: usize = 3;
 
 /// Least number of blocks of one second in all logs for tables to be fitted.
 const FEWEST_BLOCKS: usize = 6;
@@ -150,7 +150,7 @@ impl Rest {
                 low.apply(&log.samples.iter().map(f).collect::<Vec<f64>>())
             };
             let still = series(&|x| f64::from(u8::from(x.motion[1][j].abs() < log.slow[j])));
-            let points: Vec<usize> = (0..low.grid.len()).filter(|i| still[*i] < AT_REST).collect();
+            let points: Vec<usize> = (0..low.grid.len()).filter(|i| still[*i] < AT_REST_SHARE).collect();
             let torque = series(&|x| x.residual[j]);
             let columns: Vec<Vec<f64>> =
                 (0..P).map(|i| series(&|x| sigma[i] * column(arm, &x.motion, i, &log.slow)[j])).collect();
@@ -227,7 +227,7 @@ impl Rest {
                 break;
             };
             let share = (squares(&before) - squares(&left)) / whole;
-            if share < MATTERS || certainty(&before, &left, self) < CERTAIN {
+            if share < TABLE_EXPLAINED_SHARE || certainty(&before, &left, self) < CERTAIN_TABLE {
                 break;
             }
             let Some(table) = self.regression(with(law)).last_law() else { break };
@@ -366,7 +366,7 @@ mod tests {
 
     fn found_in(logs: &[LogResidual<2>]) -> Vec<Dependence> {
         let arm = TwoLink { gravity: 9.81, length1: 0.3 };
-        dependences(&arm, &[0.1; 9], &[0.01; 9], logs, Wanted { most: MOST, rotary: true })
+        dependences(&arm, &[0.1; 9], &[0.01; 9], logs, Wanted { most: MAX_TABLES, rotary: true })
     }
 
     /// Logs of two joints that oscillate at different rates, with a given torque on each joint and noise; `memory` is the part of the noise that

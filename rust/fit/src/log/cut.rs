@@ -8,7 +8,7 @@ use crate::log::track::{Smoothed, Track, median};
 
 /// Largest shift of a window's edge, relative to the window's length. With 0.4 noise floors are hardly lower, and the lengths of windows differ by
 /// more than a factor of two.
-const REACH: f64 = 0.2;
+const MAX_EDGE_SHIFT: f64 = 0.2;
 
 /// Squared error of a velocity that is measured at a reversal, in units of the variance of a typical velocity: errors of some ten standard deviations
 /// were seen. The value only has to exceed the differences between the variances of samples to which a window's edge may be shifted; other values
@@ -29,7 +29,7 @@ pub fn cut_at_smooth_motion<const N: usize>(track: &Track<N>, horizon: f64) -> V
             .min_by(|a, b| error[*a].total_cmp(&error[*b]).then_with(|| farther(a, b)))
             .unwrap_or(middle)
     };
-    let reach = |rows: usize| (REACH * rows as f64) as usize;
+    let reach = |rows: usize| (MAX_EDGE_SHIFT * rows as f64) as usize;
     let mut found: Vec<(usize, usize)> = Vec::with_capacity(windows.len());
     for (index, &(first, last)) in windows.iter().enumerate() {
         let slack = reach(last - first);

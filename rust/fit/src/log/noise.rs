@@ -31,7 +31,7 @@ const FRESH: usize = 50;
 const CHI_SQUARED_MEDIAN: f64 = 0.454_936;
 
 /// Lower bound of the estimated standard deviation of a position measurement, rad or m, so that weights of residuals stay finite.
-const LEAST: f64 = 1e-9;
+const MIN_POSITION_NOISE: f64 = 1e-9;
 
 /// Noise of a position measurement.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -51,7 +51,7 @@ pub fn noise(t: &[f64], q: &[f64], step: f64) -> Noise {
     let held = (fresh_t.len() > FRESH).then(|| scatter(&fresh_t, &fresh_q, 1)).flatten();
     let least = strided.chain(held).fold(adjacent, f64::min);
     let white = if least < CLEARLY * adjacent { least } else { adjacent };
-    let sigma = white.max(step / 12.0_f64.sqrt()).max(LEAST);
+    let sigma = white.max(step / 12.0_f64.sqrt()).max(MIN_POSITION_NOISE);
     Noise { sigma, is_held: sigma < CLEARLY * adjacent }
 }
 
@@ -176,6 +176,6 @@ mod tests {
 
     #[test]
     fn a_log_too_short_to_say_has_the_least_noise() {
-        assert_eq!(noise_level(&[0.0, 1.0], &[0.0, 1.0], 0.0), LEAST);
+        assert_eq!(noise_level(&[0.0, 1.0], &[0.0, 1.0], 0.0), MIN_POSITION_NOISE);
     }
 }

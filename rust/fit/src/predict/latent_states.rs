@@ -12,7 +12,7 @@ use armgap_core::plant::{Mode, Plant};
 use armgap_core::transmission::{LatentState, Sides, Transmission};
 
 /// Largest product of a motor's natural frequency, rad/s, and step length in the simulation of latent states.
-const STEP: f64 = 1.0;
+const MAX_PHASE_PER_STEP: f64 = 1.0;
 
 /// Time constant with which the simulated deflection of a joint with its encoder on the motor is corrected to that from the motor's torque balance,
 /// s: long compared with a sample interval, as accelerations are noisy, short compared with the ringing of a shaft with little damping, which would
@@ -238,7 +238,8 @@ impl MotorMotion<'_> {
         drawn: impl Fn(f64) -> D,
         slope: impl Fn(&D, f64, f64) -> f64,
     ) -> (f64, f64) {
-        let count = ((self.h * self.transmission.rate(f64::MAX) / STEP).ceil() as usize).clamp(1, MAX_STEPS);
+        let count = ((self.h * self.transmission.rate(f64::MAX) / MAX_PHASE_PER_STEP).ceil() as usize)
+            .clamp(1, MAX_STEPS);
         let (dt, ds) = (self.h / count as f64, 1.0 / count as f64);
         let (half, sixth) = (0.5 * dt, dt / 6.0);
         let mut here = drawn(0.0);

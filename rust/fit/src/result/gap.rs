@@ -20,7 +20,7 @@ const DRAWN: usize = 2500;
 const DRAWN_LOGS: usize = 3;
 
 /// Number of bootstrap resamples of the holdout windows for the confidence interval of the closed share.
-const RESAMPLES: usize = 500;
+const CLOSED_SHARE_RESAMPLES: usize = 500;
 
 /// Prediction horizons at which the gap is reported besides the chosen one, s.
 pub(crate) const HORIZONS: [f64; 3] = [0.1, 0.5, 1.0];
@@ -221,7 +221,7 @@ fn closed_interval<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     let (before, after) = (table(&errors.before), table(&errors.after));
     let mut random = Random(seed);
     let count = data.windows.len();
-    let mut shares: Vec<f64> = (0..RESAMPLES)
+    let mut shares: Vec<f64> = (0..CLOSED_SHARE_RESAMPLES)
         .map(|_| {
             let draw: Vec<usize> = (0..count).map(|_| random.below(count)).collect();
             let rows: usize = draw.iter().map(|&w| data.windows[w].rows()).sum();
@@ -234,7 +234,7 @@ fn closed_interval<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         })
         .collect();
     shares.sort_by(f64::total_cmp);
-    [shares[RESAMPLES / 40], shares[RESAMPLES - 1 - RESAMPLES / 40]]
+    [shares[CLOSED_SHARE_RESAMPLES / 40], shares[CLOSED_SHARE_RESAMPLES - 1 - CLOSED_SHARE_RESAMPLES / 40]]
 }
 
 /// The logs of a data set as one window per log.

@@ -17,7 +17,7 @@ const NAMEABLE: f64 = 0.3;
 
 /// Probability below which a fitted value that arms hardly ever have (a negative spring stiffness) is not named. Single logs of a real arm whose
 /// encoders have another zero in each log gave negative stiffnesses with probabilities up to 0.80 (docs/real-arm.md).
-const LIKELY: f64 = 0.9;
+const RARE_VALUE_PROBABILITY: f64 = 0.9;
 
 /// Gains of a drive, delivered over commanded torque: beyond this range, the unit of the torque column is wrong, not the drive.
 const GAINS: std::ops::RangeInclusive<f64> = 0.5..=2.0;
@@ -66,7 +66,7 @@ fn impossible(effect: &EffectInstance, probability: f64) -> Option<String> {
         "torque_gain" if !GAINS.contains(&value) => {
             Some(format!("a gain of {value:.3} is no drive's; the torque column may have another unit"))
         }
-        "joint_spring" if value < 0.0 && probability < LIKELY => {
+        "joint_spring" if value < 0.0 && probability < RARE_VALUE_PROBABILITY => {
             Some("its stiffness is negative, which no spring's is".to_owned())
         }
         _ => None,

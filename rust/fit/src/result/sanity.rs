@@ -9,7 +9,7 @@ use serde::Serialize;
 const FAR: f64 = 5.0;
 
 /// Size of an estimated value, in its standard deviations, beyond which the sign of the value is known.
-const KNOWN: f64 = 2.0;
+const SIGN_KNOWN: f64 = 2.0;
 
 /// Ratio of a nominal to an estimated value, in size, below which the nominal value counts as zero and its sign as unknown.
 const COMPARABLE: f64 = 0.2;
@@ -24,7 +24,7 @@ const STUCK: &str = "beside so large a gap the logs say less about the parameter
 /// Largest standard deviation of a parameter relative to its value (or to the largest value of the same unit). A value ten times as large then costs
 /// one unit of squared deviation, which any log outweighs, and steps of finite differences, which are proportional to the standard deviation, lead to
 /// no impossible arm.
-const WIDEST: f64 = 10.0;
+const MAX_RELATIVE_SIGMA: f64 = 10.0;
 
 /// Reason why a re-estimated parameter is not to be believed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, JsonSchema, Serialize)]
@@ -73,7 +73,7 @@ impl Estimate {
     /// Whether the signs of the nominal and the estimated value are both known and differ.
     fn is_turned(&self) -> bool {
         self.nominal * self.value < 0.0
-            && self.value.abs() > KNOWN * self.sigma
+            && self.value.abs() > SIGN_KNOWN * self.sigma
             && self.nominal.abs() > COMPARABLE * self.value.abs()
     }
 
@@ -94,7 +94,10 @@ pub fn sanity(kind: ArmKind, estimates: &[Estimate], remains: bool) -> Vec<Sanit
     let one = |(i, (parameter, estimate)): (usize, (&Parameter, &Estimate))| {
         let (found, message) = if is_gravity(kind, i) && estimate.is_turned() {
             (Kind::Sign, turned(parameter, estimate))
-        } else if i >= kind.inertial() && estimate.value == 0.0 && estimate.nominal > KNOWN * estimate.prior {
+        } else if i >= kind.inertial()
+            && estimate.value == 0.0
+            && estimate.nominal > SIGN_KNOWN * estimate.prior
+        {
             (
                 Kind::Zero,
                 format!(
@@ -153,7 +156,7 @@ pub fn bounded_sigma(kind: ArmKind, theta: &[f64], sigma: &[f64]) -> Vec<f64> {
     };
     let bounded = |(i, sigma): (usize, &f64)| {
         let size = if theta[i] == 0.0 { largest(parameters[i].unit) } else { theta[i].abs() };
-        if size > 0.0 { sigma.min(WIDEST * size) } else { *sigma }
+        if size > 0.0 { sigma.min(MAX_RELATIVE_SIGMA * size) } else { *sigma }
     };
     sigma.iter().enumerate().map(bounded).collect()
 }

@@ -101,7 +101,7 @@ pub const ALMOST: f64 = 0.95;
 const ALMOST_IN_DOUBT: f64 = 0.6;
 
 /// Share of the gap above the noise floor that a candidate must remove to explain most of the gap.
-const MOST: f64 = 0.5;
+const MOST_OF_GAP: f64 = 0.5;
 
 /// Difference between the costs of the best candidate and another one, relative to the decrease of the cost by the best one, below which the two are
 /// look-alikes, which the logs cannot distinguish.
@@ -129,7 +129,7 @@ impl<const N: usize, const P: usize> SearchNode<N, P> {
     /// noise.
     fn settles_outliers(&self, candidate: &Candidate<P>) -> bool {
         self.is_typically_noise()
-            && self.share(candidate) > MOST
+            && self.share(candidate) > MOST_OF_GAP
             && self.settles(&candidate.training, &self.base.training)
             && self.settles(&candidate.holdout, &self.base.holdout)
     }
@@ -235,7 +235,7 @@ fn simplest<const N: usize, const P: usize>(
     regularised: bool,
     min_relevance: f64,
 ) -> usize {
-    let almost = if node.share(&node.candidates[best]) > MOST { ALMOST } else { ALMOST_IN_DOUBT };
+    let almost = if node.share(&node.candidates[best]) > MOST_OF_GAP { ALMOST } else { ALMOST_IN_DOUBT };
     let offer = |candidate: &Candidate<P>| Offer {
         advantage: node.base.score() - candidate.score(),
         values: free_values(candidate, regularised),
@@ -310,7 +310,7 @@ pub fn is_regularisation<const N: usize, const P: usize>(
     node: &SearchNode<N, P>,
     candidate: &Candidate<P>,
 ) -> bool {
-    node.share(candidate) > MOST && is_certain(node, candidate, CERTAIN_ENOUGH)
+    node.share(candidate) > MOST_OF_GAP && is_certain(node, candidate, CERTAIN_ENOUGH)
 }
 
 /// Whether a candidate adds an effect with which fitted parameters that were implausible return towards their prior values, which is a ground to

@@ -16,11 +16,11 @@ use armgap_core::arm::Arm;
 use armgap_core::integrate::largest_stable_rate;
 
 /// Widths of friction regularisation that are tried on all joints at once, relative to the slowest joint's RMS speed.
-const WIDTHS: [f64; 7] = [0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0];
+const RELATIVE_WIDTHS: [f64; 7] = [0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0];
 
 /// Ranges of the searches for widths of friction regularisation, as factors above and below the centre: of the common width around the best of
-/// `WIDTHS`, and of each joint's width around the common one.
-const REACH: [f64; 2] = [4.0, 20.0];
+/// `RELATIVE_WIDTHS`, and of each joint's width around the common one.
+const WIDTH_RANGES: [f64; 2] = [4.0, 20.0];
 
 /// Number of evaluations of the cost in each search for a width of friction regularisation: of the width common to all joints, and of one joint's
 /// own.
@@ -28,10 +28,10 @@ const EVALUATIONS: [u64; 2] = [6, 7];
 
 /// Search that refines a joint's width of friction regularisation after the parameters are fitted again: range as a factor above and below the
 /// present width, and number of evaluations of the cost.
-const REFINED: (f64, u64) = (1.5, 6);
+const WIDTH_REFINEMENT: (f64, u64) = (1.5, 6);
 
 /// Largest number of rounds in which the widths of friction regularisation are refined, with the parameters fitted between the rounds.
-const ROUNDS: usize = 3;
+const WIDTH_ROUNDS: usize = 3;
 
 /// Widths of friction regularisation by joint, rad/s or m/s, and the cost of the model with these widths.
 type Widths<const N: usize> = ([f64; N], f64);
@@ -67,10 +67,10 @@ fn least_widths<const N: usize>(
         .map(|width| ([width; N], cost([width; N])))
         .filter(|(_, cost)| cost.is_finite())
         .min_by(|a, b| a.1.total_cmp(&b.1))?;
-    best = nearby(&cost, best, 0..N, (REACH[0], EVALUATIONS[0]));
+    best = nearby(&cost, best, 0..N, (WIDTH_RANGES[0], EVALUATIONS[0]));
     if N > 1 {
         for joint in 0..N {
-            best = nearby(&cost, best, joint..joint + 1, (REACH[1], EVALUATIONS[1]));
+            best = nearby(&cost, best, joint..joint + 1, (WIDTH_RANGES[1], EVALUATIONS[1]));
         }
     }
     Some(best)
@@ -80,7 +80,7 @@ fn least_widths<const N: usize>(
 fn refined_widths<const N: usize>(cost: impl Fn([f64; N]) -> f64, from: [f64; N]) -> Widths<N> {
     (0..N)
         .filter(|j| from[*j] > 0.0)
-        .fold((from, cost(from)), |best, joint| nearby(&cost, best, joint..joint + 1, REFINED))
+        .fold((from, cost(from)), |best, joint| nearby(&cost, best, joint..joint + 1, WIDTH_REFINEMENT))
 }
 
 /// Widths of friction regularisation, each raised to the joint's `narrowest` if it is smaller, rad/s or m/s; the zero widths of exact friction
@@ -90,7 +90,7 @@ fn no_narrower<const N: usize>(widths: [f64; N], narrowest: [f64; N]) -> [f64; N
 }
 
 /// The tried widths in increasing order, each raised to the smallest of the joints' `narrowest` widths if it is smaller, and equal ones listed once.
-fn distinct<const N: usize>(tried: [f64; WIDTHS.len()], narrowest: [f64; N]) -> Vec<f64> {
+fn distinct<const N: usize>(tried: [f64; RELATIVE_WIDTHS.len()], narrowest: [f64; N]) -> Vec<f64> {
     let least = narrowest.into_iter().fold(f64::INFINITY, f64::min);
     let mut distinct: Vec<f64> = tried.into_iter().map(|width| width.max(least)).collect();
     distinct.dedup();
@@ -138,7 +138,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         model: &Hypothesis<P>,
         jacobian: &[Vec<f64>],
     ) -> Option<Hypothesis<P>> {
-        let tried = WIDTHS.map(|part| part * self.scales.slowest());
+        let tried = RELATIVE_WIDTHS.map(|part| part * self.scales.slowest());
         let search =
             |cost: &dyn Fn([f64; N]) -> f64, narrowest| least_widths(cost, distinct(tried, narrowest));
         with_widths(problem, model, jacobian, search)
@@ -192,7 +192,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     ) -> Candidate<P> {
         let problem = self.problem(&node.weights.training);
         let cost = |of: &Candidate<P>| of.fit.data_cost + of.fit.prior_cost;
-        for _ in 0..ROUNDS {
+        for _ in 0..WIDTH_ROUNDS {
             let model = &best.fit.hypothesis;
             let own = std::array::from_fn(|j| model.rounding[j]);
             let near = |cost: &dyn Fn([f64; N]) -> f64, _| Some(refined_widths(cost, own));
@@ -218,14 +218,14 @@ mod tests {
 
     #[test]
     fn a_common_width_is_found_between_those_tried() {
-        let (widths, cost) = least_widths(apart([0.005]), WIDTHS).expect("finite costs");
+        let (widths, cost) = least_widths(apart([0.005]), RELATIVE_WIDTHS).expect("finite costs");
         assert!((widths[0] / 0.005).ln().abs() < 0.05 && cost < 0.0025, "{widths:?}");
     }
 
     #[test]
     fn every_joint_has_a_width_of_its_own() {
         for best in [[0.002, 0.03], [0.05, 0.004], [0.01, 0.01]] {
-            let (widths, _) = least_widths(apart(best), WIDTHS).expect("finite costs");
+            let (widths, _) = least_widths(apart(best), RELATIVE_WIDTHS).expect("finite costs");
             for (found, wanted) in widths.iter().zip(best) {
                 assert!((found / wanted).ln().abs() < 0.2, "{widths:?} for {best:?}");
             }
@@ -235,9 +235,9 @@ mod tests {
     #[test]
     fn widths_that_cannot_be_simulated_are_passed_over() {
         let cost = |widths: [f64; 2]| if widths[0] < 0.01 { f64::NAN } else { widths[0] + widths[1] };
-        let (widths, cost) = least_widths(cost, WIDTHS).expect("some are finite");
+        let (widths, cost) = least_widths(cost, RELATIVE_WIDTHS).expect("some are finite");
         assert!(widths[0] >= 0.01 && cost.is_finite());
-        assert!(least_widths(|_: [f64; 2]| f64::INFINITY, WIDTHS).is_none());
+        assert!(least_widths(|_: [f64; 2]| f64::INFINITY, RELATIVE_WIDTHS).is_none());
     }
 
     #[test]
@@ -256,7 +256,7 @@ mod tests {
         let narrowest = [0.004, 0.01];
         assert_eq!(no_narrower([0.001, 0.02], narrowest), [0.004, 0.02]);
         assert_eq!(no_narrower([0.0, 0.002], narrowest), [0.0, 0.01]);
-        assert_eq!(distinct(WIDTHS, narrowest), [0.004, 0.01, 0.03, 0.1, 0.3, 1.0]);
-        assert_eq!(distinct(WIDTHS, [0.0; 2]), WIDTHS);
+        assert_eq!(distinct(RELATIVE_WIDTHS, narrowest), [0.004, 0.01, 0.03, 0.1, 0.3, 1.0]);
+        assert_eq!(distinct(RELATIVE_WIDTHS, [0.0; 2]), RELATIVE_WIDTHS);
     }
 }

@@ -21,7 +21,7 @@ use armgap_core::arm::Arm;
 const RIVALS: f64 = 0.5;
 
 /// Largest number of rivals that are tried in the place of each cause.
-const TRIED: usize = 3;
+const MAX_RIVALS: usize = 3;
 
 /// Mean decrease of the windows' cost, in standard errors of this mean, when a rival replaces a cause in the model with all other causes, above which
 /// the rival is better.
@@ -96,14 +96,15 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
                 && share > (RIVALS * of_cause).max(MATTERS)
         };
         let finalists =
-            node.candidates.iter().filter(|c| is_rival(c, node.share(c), node.share(cause))).take(TRIED);
+            node.candidates.iter().filter(|c| is_rival(c, node.share(c), node.share(cause))).take(MAX_RIVALS);
         // A candidate with fewer free values may have been dropped early for errors that are due to other causes.
         let of_cause = node.field.iter().find(|(c, _)| c.effect.is_some_and(|e| e.same_place(adopted)));
         let is_final = |c: &Candidate<P>| node.candidates.iter().any(|f| f.is_same(c));
         let passed_over = node.field.iter().filter(|(c, share)| {
             size(c) < size(cause) && !is_final(c) && is_rival(c, *share, of_cause.map_or(0.0, |x| x.1))
         });
-        let rivals: Vec<&Candidate<P>> = finalists.chain(passed_over.map(|(c, _)| c).take(TRIED)).collect();
+        let rivals: Vec<&Candidate<P>> =
+            finalists.chain(passed_over.map(|(c, _)| c).take(MAX_RIVALS)).collect();
         if rivals.is_empty() {
             return None;
         }

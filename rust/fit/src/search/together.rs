@@ -17,10 +17,10 @@ const NEARLY_ALL: f64 = 0.85;
 
 /// Decrease of the cost that a score test (first order) must promise for some second effect, relative to the decrease needed from it, for a second
 /// effect to be fitted together with a first one that is accepted on trial.
-const FORESEEN: f64 = 0.3;
+const PROMISED_DECREASE: f64 = 0.3;
 
 /// Number of candidates that are accepted on trial, one after another, as the first of two causes.
-const TRIED: usize = 3;
+const CANDIDATES_ON_TRIAL: usize = 3;
 
 /// Least mean decrease of the windows' cost by a candidate, in standard errors of this mean, for the candidate to be tried as one of two causes,
 /// unless it brings implausible parameters back to their prior values.
@@ -60,7 +60,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             .candidates
             .iter()
             .filter(hopeful)
-            .take(TRIED)
+            .take(CANDIDATES_ON_TRIAL)
             .find_map(|first| self.beside(alone, first, min_relevance, seed))
     }
 
@@ -76,7 +76,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let (fit, weights) = self.settle(&first.fit.hypothesis, alone.weights.training.scale);
         // Share of the gap left by `first` that a second effect must remove for the two to remove `NEARLY_ALL` of the whole gap.
         let needed = 1.0 - (1.0 - NEARLY_ALL) / (1.0 - alone.share(first)).max(1e-9);
-        if self.largest_gain(&fit, &weights) < FORESEEN * needed {
+        if self.largest_gain(&fit, &weights) < PROMISED_DECREASE * needed {
             return None;
         }
         let node = self.node_around((fit, weights), min_relevance);

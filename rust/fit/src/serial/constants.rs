@@ -46,12 +46,12 @@ pub const ALIKE: f64 = 0.05;
 pub const ALIKE_COST: f64 = 4.0;
 
 /// Number of candidate terms, the best by first-order tests, that are fitted in each step of the model search.
-pub const FINALISTS: usize = 8;
+pub const TERM_FINALISTS: usize = 8;
 
 /// Largest number of Gauss-Newton iterations in which the parameters of a model's terms are fitted; twelve iterations give the same diagnoses.
-pub const ITERATIONS: usize = 6;
+pub const MAX_TERM_ITERATIONS: usize = 6;
 
-/// Relative decrease of the cost in one iteration below which the fit of a model's terms ends, see [`ITERATIONS`].
+/// Relative decrease of the cost in one iteration below which the fit of a model's terms ends, see [`MAX_TERM_ITERATIONS`].
 pub const ENOUGH: f64 = 1e-3;
 
 /// Number of bootstrap resamples of the one-second blocks of the logs from which the probability of a cause is taken.

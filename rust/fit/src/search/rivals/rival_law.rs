@@ -7,7 +7,7 @@
 use crate::likelihood::context::{DiagnosisContext, SplitWeighting, WindowSet};
 use crate::likelihood::solve::{Effort, Fit};
 use crate::locate::dependence::Dependence;
-use crate::locate::unnamed::{LogResidual, MOST, Wanted, dependences};
+use crate::locate::unnamed::{LogResidual, MAX_TABLES, Wanted, dependences};
 use crate::model::custom_effect::{self, UNNAMED};
 use crate::model::hypothesis::{EffectInstance, Hypothesis};
 use crate::predict::residual_torque::measured_motion;
@@ -29,7 +29,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let rest = full - self.floor(weights);
         let predicts =
             |law: &Dependence| full - self.cost_beside(&model.hypothesis, law, weights) > MATTERS * rest;
-        let mut laws = self.dependences(&model.hypothesis, Wanted { most: MOST, rotary });
+        let mut laws = self.dependences(&model.hypothesis, Wanted { most: MAX_TABLES, rotary });
         laws.retain(predicts);
         laws
     }

@@ -27,7 +27,7 @@ const MOST_PERIODS: usize = 100;
 
 /// Part of a controller period by which a sample interval may be longer than a whole number of periods before it is divided into one period more, as
 /// sample times carry rounding errors.
-const ROUNDING: f64 = 1e-6;
+const PERIOD_ROUNDING: f64 = 1e-6;
 
 /// Time after which a commanded torque no longer influences a drive's torque, as a multiple of the sum of the drive's delays and time constants.
 const FORGOTTEN: f64 = 8.0;
@@ -236,7 +236,7 @@ fn periods<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     };
     let servo = servos.iter().enumerate().map(rate).fold(0.0, f64::max);
     let rate = (servo / RESOLVED).max(plant.fastest(q).max(plant.viscous_rate(q)) / 1.5);
-    ((h * rate.max(1.0 / PERIOD) - ROUNDING).ceil() as usize).clamp(1, MOST_PERIODS)
+    ((h * rate.max(1.0 / PERIOD) - PERIOD_ROUNDING).ceil() as usize).clamp(1, MOST_PERIODS)
 }
 
 #[cfg(test)]

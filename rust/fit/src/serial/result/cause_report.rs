@@ -11,7 +11,7 @@ use crate::serial::term::{Term, TermKind};
 use armgap_core::effect::{Effect, Scope, Trial, catalogue};
 
 /// One-sided 95 % quantile of the standard normal distribution, for upper confidence limits of the sizes of effects.
-const NORMAL_95: f64 = 1.645;
+const NORMAL_95_ONE_SIDED: f64 = 1.645;
 
 /// Standard deviation of an effect's estimated torque (RMS), relative to the joint's RMS torque, above which the logs do not excite the effect.
 const NOT_EXCITED: f64 = 0.2;
@@ -157,7 +157,7 @@ fn status(found: &Found, unexplained: &[Option<f64>], tested: &Tested, rotary: &
         return entry(Status::NotExcited, None, Some("these logs do not pin its size down".to_owned()));
     }
     let statistic = (size / sigma.max(f64::MIN_POSITIVE)).powi(2);
-    let largest = size.abs() + NORMAL_95 * sigma;
+    let largest = size.abs() + NORMAL_95_ONE_SIDED * sigma;
     if statistic > SIGNIFICANT - NOTICED && largest * tested.consequence > 10.0 * CONSEQUENCE {
         let why = "explains a part of what remains, and too little of it to be named".to_owned();
         return entry(Status::Undecided, None, Some(why));

@@ -26,7 +26,7 @@ use crate::serial::{SerialArm, Set};
 use armgap_core::chain::Chain;
 
 /// Number of bootstrap resamples of the holdout's windows for the confidence interval of the closed share.
-const RESAMPLES: usize = 500;
+const CLOSED_SHARE_RESAMPLES: usize = 500;
 
 /// The three models that a report compares (arm file, re-estimated, with the named causes), and their predictions on the holdout.
 struct Compared<const N: usize, const P: usize> {
@@ -243,7 +243,7 @@ fn closed_interval<const N: usize, const P: usize>(
     };
     let (before, after) = (table(&compared.predicted[0]), table(&compared.predicted[2]));
     let mut random = Random(seed);
-    let mut shares: Vec<f64> = (0..RESAMPLES)
+    let mut shares: Vec<f64> = (0..CLOSED_SHARE_RESAMPLES)
         .map(|_| {
             let draw: Vec<usize> = data.windows.iter().map(|_| random.below(data.windows.len())).collect();
             let rows: usize = draw.iter().map(|w| data.windows[*w].rows()).sum();
@@ -256,7 +256,7 @@ fn closed_interval<const N: usize, const P: usize>(
         })
         .collect();
     shares.sort_by(f64::total_cmp);
-    [shares[RESAMPLES / 40], shares[RESAMPLES - 1 - RESAMPLES / 40]]
+    [shares[CLOSED_SHARE_RESAMPLES / 40], shares[CLOSED_SHARE_RESAMPLES - 1 - CLOSED_SHARE_RESAMPLES / 40]]
 }
 
 fn free_runs<const N: usize, const P: usize>(

@@ -1,6 +1,6 @@
 //! Fits of a serial arm's model with terms to the training logs, and their costs on the holdout.
 
-use crate::serial::constants::{ENOUGH, ITERATIONS, LOOSE};
+use crate::serial::constants::{ENOUGH, LOOSE, MAX_TERM_ITERATIONS};
 use crate::serial::search::{Motion, Search};
 use crate::serial::term::row_term::{RowLaw, RowTerm};
 use crate::serial::term::{Term, TermKind};
@@ -8,7 +8,7 @@ use crate::serial::weak_form::rows::{Estimate, Regression, Signal, sum};
 use rayon::prelude::*;
 
 /// Relative step of a parameter in numerical derivatives of a term's torque.
-const STEP: f64 = 1e-3;
+const PARAMETER_STEP: f64 = 1e-3;
 
 /// Prior precision (inverse variance) by which an amplitude that is not estimated is held at zero.
 const HELD: f64 = 1e30;
@@ -58,7 +58,7 @@ impl Search<'_> {
         self.progress.check();
         let mut terms = terms;
         let mut estimate = self.estimated(regression, &terms, theta);
-        for _ in 0..ITERATIONS {
+        for _ in 0..MAX_TERM_ITERATIONS {
             if terms.is_empty() {
                 break;
             }
@@ -195,7 +195,7 @@ impl Search<'_> {
             .par_iter()
             .map(|&(i, k)| {
                 let (term, k) = terms[i].moved_by(k);
-                let step = STEP * if term.p[k] == 0.0 { 1.0 } else { term.p[k].abs() };
+                let step = PARAMETER_STEP * if term.p[k] == 0.0 { 1.0 } else { term.p[k].abs() };
                 let at = |sign: f64| {
                     let mut p = term.p.clone();
                     p[k] += sign * step;

@@ -1,7 +1,7 @@
 //! Screening of candidate terms: first-order tests of all candidates, and fits of the candidates that pass.
 
 use crate::progress::Phase;
-use crate::serial::constants::{FINALISTS, PRICE};
+use crate::serial::constants::{PRICE, TERM_FINALISTS};
 use crate::serial::search::Search;
 use crate::serial::search::fitting::{Fitted, difference};
 use crate::serial::term::row_term::{RowLaw, RowTerm};
@@ -201,7 +201,7 @@ impl Search<'_> {
         screened: &[(Term, f64)],
     ) -> Vec<Fitted> {
         let worth = |(term, gain): &&(Term, f64)| *gain > PRICE + 2.0 * term.degrees;
-        let wanted: Vec<&(Term, f64)> = screened.iter().filter(worth).take(FINALISTS).collect();
+        let wanted: Vec<&(Term, f64)> = screened.iter().filter(worth).take(TERM_FINALISTS).collect();
         self.progress.begin(Phase::Candidates, wanted.len());
         wanted
             .par_iter()

@@ -25,11 +25,11 @@ const SPACING: f64 = 0.5;
 
 /// Speed, in standard deviations of the measured velocity, below which a joint counts as at rest: the measured torque then only bounds the dry
 /// friction.
-const AT_REST: f64 = 3.0;
+const AT_REST_DEVIATIONS: f64 = 3.0;
 
 /// Speed, relative to a joint's RMS speed, below which the joint counts as at rest: before it slides, it may creep under a torque below its Coulomb
 /// level. At a reversal with a tenth of the largest acceleration a joint is this slow for only some milliseconds.
-const SLOW: f64 = 0.01;
+const AT_REST_SPEED: f64 = 0.01;
 
 /// Time between two samples, in sample periods, beyond which the log counts as interrupted: no test function extends over the interruption.
 const GAP: f64 = 3.5;
@@ -71,7 +71,7 @@ impl<const N: usize> Intervals<N> {
         let begin = track.t.first().copied().unwrap_or(0.0);
         let slow: [f64; N] = std::array::from_fn(|j| {
             let square: f64 = smoothed.iter().map(|s| s[j].local.dq.powi(2)).sum();
-            SLOW * (square / smoothed.len().max(1) as f64).sqrt()
+            AT_REST_SPEED * (square / smoothed.len().max(1) as f64).sqrt()
         });
         let middle = |k: usize| -> Middle<N> {
             let h = track.t[k + 1] - track.t[k];
@@ -87,7 +87,7 @@ impl<const N: usize> Intervals<N> {
                 tau: std::array::from_fn(|j| track.held[k][j].mean()),
                 rest: std::array::from_fn(|j| {
                     let deviation = track.noise[j] * a[j].local.covariance[2].sqrt();
-                    dq[j].abs() < slow[j].max(AT_REST * deviation)
+                    dq[j].abs() < slow[j].max(AT_REST_DEVIATIONS * deviation)
                 }),
             }
         };

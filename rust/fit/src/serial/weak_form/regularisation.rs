@@ -7,7 +7,7 @@ use crate::serial::constants::PRICE;
 use crate::serial::weak_form::rows::{Prior, Regression, Rows};
 
 /// Widths of friction regularisation that are tried as alternatives to dry friction, rad/s (m/s).
-const WIDTHS: [f64; 7] = [0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2];
+const REGULARISATION_WIDTHS: [f64; 7] = [0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2];
 
 /// Width of friction regularisation by joint, rad/s (m/s), zero for dry friction.
 ///
@@ -33,7 +33,7 @@ pub fn widths(
         if level(j) <= 0.0 || rows.joints[j].y.is_empty() {
             return 0.0;
         }
-        let tried = WIDTHS.iter().map(|width| (*width, cost(j, *width)));
+        let tried = REGULARISATION_WIDTHS.iter().map(|width| (*width, cost(j, *width)));
         let (width, least) = tried.fold((0.0, dry.cost - PRICE), |a, b| if b.1 < a.1 { b } else { a });
         if least < dry.cost - PRICE { width } else { 0.0 }
     };
