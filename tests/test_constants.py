@@ -35,12 +35,10 @@ def test_every_constant_has_its_reason(title: str) -> None:
 
 @pytest.mark.parametrize("title", PACKAGES)
 def test_no_name_has_two_values(title: str) -> None:
-    """In one file, or among names that other files may use."""
+    """Within a package, whether or not other files may use the name."""
     values = defaultdict(set)
     for constant in PACKAGES[title]:
-        values[constant.file, constant.name].add(constant.value)
-        if constant.shared:
-            values["", constant.name].add(constant.value)
+        values[constant.name].add(constant.value)
     assert {name: found for name, found in values.items() if len(found) > 1} == {}
 
 

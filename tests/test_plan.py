@@ -71,7 +71,7 @@ def brief(monkeypatch: pytest.MonkeyPatch) -> None:
     """Compare six motions only: these tests are about what a plan is, not about the best of them."""
     monkeypatch.setattr(search, "GENERATIONS", 0)
     monkeypatch.setattr(search, "POPULATION", 6)
-    monkeypatch.setattr(search, "_POSES", ((0.3, 0.7),))
+    monkeypatch.setattr(search, "_POSE_PAIRS", ((0.3, 0.7),))
 
 
 def predicted_motion(diagnosis: Diagnosis, arm: Arm, motion: Motion) -> PredictedMotion:

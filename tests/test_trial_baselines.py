@@ -136,7 +136,7 @@ def test_masses_of_the_mujoco_model_move_as_the_base_parameters_do(kind, arm, tm
 def test_mujoco_sysid_finds_an_offset(arm, monkeypatch):
     pytest.importorskip("absl", reason="pip install 'armgap[trial-baselines]'")
     module = importlib.import_module("armgap.trial.baselines.sysid")
-    monkeypatch.setattr(module, "_WINDOWS", 4)
+    monkeypatch.setattr(module, "_FITTED_WINDOWS", 4)
     monkeypatch.setattr(module, "ITERATIONS", 4)
     case = sealed(arm, Effect("torque_offset", 2, {"offset": 1.0}), seconds=3.0)
     answer = methods()["sysid"].answer(case)

@@ -41,7 +41,7 @@ _TABLES: dict[str, tuple[str, ...]] = {
     "sealed": ("sha256",),
 }
 _SCALARS = ("name", "kind", "gravity", "sample_period")
-_MOST_BYTES = 2**20
+_MAX_ARM_FILE_BYTES = 2**20
 """Largest accepted size of an arm file, bytes: a thousand times what an arm file needs."""
 _FORMATS = "docs/formats.md, Arm file"
 _CLOSE_KIND = 0.75
@@ -55,7 +55,7 @@ _REMEDY_MARKUP = (
 #: are right to 10 %, friction coefficients to half.
 _INERTIAL_SIGMA = 0.1
 _FRICTION_SIGMA = 0.5
-_LISTED = 40
+_LISTED_NAMES = 40
 """Largest number of names that an error message lists: enough for all keys of a table, too few for all links of a humanoid."""
 STRONGEST_GRAVITY = 30.0  # largest accepted acceleration of gravity, m/s^2
 # Range of plausible sample periods [s]; a period outside the range is in another unit.
@@ -77,7 +77,7 @@ class ArmFile:
     def load(cls, path: Path) -> ArmFile:
         """Read an arm file as TOML."""
         try:
-            text = read_bounded(path, _MOST_BYTES).decode("utf-8-sig")
+            text = read_bounded(path, _MAX_ARM_FILE_BYTES).decode("utf-8-sig")
         except OSError as error:
             raise ArmFileError(
                 f"cannot be read ({error.strerror or error})", remedy="give the path of an arm file", file=path
@@ -359,6 +359,6 @@ def _markup(text: str) -> str:
 def suggest(word: str, known: Sequence[str], cutoff: float = 0.6) -> str:
     """Return a hint for a misspelt word: the closest known word, then the first of the known words."""
     close = difflib.get_close_matches(word, known, n=1, cutoff=cutoff)
-    more = f", and {len(known) - _LISTED} more" if len(known) > _LISTED else ""
-    listed = ", ".join(known[:_LISTED]) + more
+    more = f", and {len(known) - _LISTED_NAMES} more" if len(known) > _LISTED_NAMES else ""
+    listed = ", ".join(known[:_LISTED_NAMES]) + more
     return f"did you mean `{close[0]}`? (known: {listed})" if close else f"known: {listed}"

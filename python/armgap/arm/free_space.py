@@ -13,7 +13,7 @@ __all__ = ["FreeSpace"]
 Array = NDArray[np.float64]
 
 #: Spacing of the points along a link's axis, as a part of the link's radius and of the link's length, whichever is larger.
-_STEP, _FEWEST = 0.5, 1 / 50
+_POINT_SPACING_PER_RADIUS, _POINT_SPACING_PER_LENGTH = 0.5, 1 / 50
 #: Part of the last link, from its joint on, that is not checked against the link before it: links touch at the joint they share.
 JOINED = 0.5
 
@@ -92,7 +92,7 @@ class FreeSpace:
         """Return points along the axis of every link, shape (n_poses, n_points, 2), each with the spacing of the points [m]."""
         begin, found = np.zeros((len(q), 2)), []
         for length, radius, angle in zip(self.link_length, self.link_radius, np.cumsum(q, axis=1).T, strict=True):
-            count = math.ceil(length / max(_STEP * radius, _FEWEST * length)) + 1
+            count = math.ceil(length / max(_POINT_SPACING_PER_RADIUS * radius, _POINT_SPACING_PER_LENGTH * length)) + 1
             along = np.linspace(0.0, length, count)
             # At position zero a link hangs straight down; angles grow towards +x.
             way = np.stack([np.sin(angle), -np.cos(angle)], axis=1)

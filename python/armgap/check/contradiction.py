@@ -48,7 +48,7 @@ READINGS: tuple[Callable[[Arm, float], Iterable[Reading]], ...] = (
 
 # A reading of the input is refitted if it lowers the mean log share of unexplained torque by this much. On logs of a simulator the right
 # reading wins by 0.17 to 4; on single logs of a real arm a wrong reading has won by up to 0.6, which predictions then refute.
-_SUSPICIOUS = 0.1
+_MIN_REFIT_GAIN = 0.1
 # Largest number of readings of the input that are refitted.
 _MOST_SUSPECTS = 3
 # A reading of the input is right if its prediction error is below this part of the prediction error with the log as it stands. Unmodelled effects
@@ -70,8 +70,8 @@ EXPLAINS = 0.3
 _ACCOUNTS_FOR = 0.1
 # Prediction errors below this part of the motion count as none.
 _NEGLIGIBLE = 1e-3
-# Ratio of prediction errors up to which another reading, with an equation error equal to within `_SUSPICIOUS`, is named with the best reading.
-_ALIKE = 1.05
+# Ratio of prediction errors up to which another reading, with an equation error equal to within `_MIN_REFIT_GAIN`, is named with the best reading.
+_ALIKE_ERROR_RATIO = 1.05
 # Standard deviations beyond the bounds from which parameters count as impossible.
 _SURE = 3.0
 
@@ -173,7 +173,7 @@ def screen(base: EquationError, logs: Sequence[Log], arm: Arm) -> tuple[Fit, lis
     for readings in READINGS:
         for reading in readings(arm, travel):
             fit = _read(reading, base, logs, arm, low, high)
-            if (gain := stands.cost - fit.cost) > _SUSPICIOUS:
+            if (gain := stands.cost - fit.cost) > _MIN_REFIT_GAIN:
                 suspects.append(Suspect(reading, fit, gain))
     return stands, sorted(suspects, key=lambda s: -s.gain)
 
@@ -233,6 +233,10 @@ def confirm(
         return None
     tried.sort(key=lambda entry: math.log(entry[0]) - entry[1].gain)
     ratio, best, refit = tried[0]
-    alike = tuple(s.reading for part, s, _ in tried[1:] if part <= _ALIKE * ratio and best.gain - s.gain <= _SUSPICIOUS)
+    alike = tuple(
+        s.reading
+        for part, s, _ in tried[1:]
+        if part <= _ALIKE_ERROR_RATIO * ratio and best.gain - s.gain <= _MIN_REFIT_GAIN
+    )
     shares = (float(stands.share.max()), float(best.fit.share.max()))
     return Found(best.reading, alike, shares, (as_is.error, refit.error))

@@ -21,12 +21,12 @@ _SHORTEST_S = 0.4
 # Time after which the filters' transient has faded [s], six of their time constants.
 _FORGOTTEN_S = 0.2
 # Ratio of the mean square residual of the equation of motion in a dead stretch to that elsewhere, and residual as a share of the joint's torque.
-_WORSE = 25.0
+_MISFIT_RATIO = 25.0
 _SHARE = 0.1
 # Largest time [s] between the beginnings of stretches of constant torque that are judged together, by rows outside of all stretches.
 _TOGETHER_S = 16.0
 # Smallest number of rows of the equation of motion, inside and outside of a stretch, by which the stretch is judged.
-_FEWEST = 30
+_MIN_STRETCH_ROWS = 30
 
 
 def find(logs: Sequence[Log], arm: Arm) -> list[Check]:
@@ -77,7 +77,7 @@ def _judged(log: Log, arm: Arm, runs: list[Run], near: list[Run]) -> list[Check]
         settled = log.t[first] + _FORGOTTEN_S
         dead[(when >= settled) & (when <= log.t[last]), j] = True
         alive &= (when < log.t[first]) | (when > log.t[last] + _FORGOTTEN_S)
-    if alive.sum() < _FEWEST:
+    if alive.sum() < _MIN_STRETCH_ROWS:
         return []
     outside = Rows(rows.psi[alive], rows.y[alive], rows.samples[alive])
     base = EquationError([outside], arm)
@@ -85,10 +85,10 @@ def _judged(log: Log, arm: Arm, runs: list[Run], near: list[Run]) -> list[Check]
     checks = []
     for j, first, last in near:
         inside = dead[:, j] & (rows.samples >= first) & (rows.samples <= last)
-        if inside.sum() < _FEWEST:
+        if inside.sum() < _MIN_STRETCH_ROWS:
             continue
         within = float(np.mean(residual[inside, j] ** 2))
-        if within > _WORSE * float(np.mean(residual[alive, j] ** 2)) and within > _SHARE * float(base.scale[j]):
+        if within > _MISFIT_RATIO * float(np.mean(residual[alive, j] ** 2)) and within > _SHARE * float(base.scale[j]):
             checks.append(_check(log, j, first, last, within, residual[alive, j]))
     return _merged(checks)
 

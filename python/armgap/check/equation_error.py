@@ -29,7 +29,7 @@ _LARGEST_CUTOFF = 0.5
 # Time constants of the filters that pass before a row is used, after the start and after a hole in the samples.
 _SETTLING = 4.0
 # Length of a hole in the samples, in sample periods, beyond which the filters start anew.
-_HOLE = 3.0
+_HOLE_PERIODS = 3.0
 # Factor by which inertias and gravity parameters may differ from the arm file. Arm files off by three are re-estimated; ten is another unit.
 _TRUST_FACTOR = 5.0
 # Largest number of samples used of one log: 16 s at 4 ms; more samples tell nothing new about a sign.
@@ -37,9 +37,9 @@ _LARGEST_LOG = 4000
 # Length of log on either side of a stretch that the stretch is compared with [s]: a few periods of the slowest informative motions.
 _BESIDE_S = 8.0
 # Share of a joint's torque below which a residual counts as explained: unmodelled effects leave as much in sound logs of real arms.
-_EXPLAINED = 0.02
+_EXPLAINED_RESIDUAL_SHARE = 0.02
 # Share of a joint's torque below which a residual counts as zero.
-_EXACT = 1e-5
+_ZERO_RESIDUAL_SHARE = 1e-5
 # Decrease of the cost, as a part of the largest moment, from which the active set method leaves a bound.
 _SETTLED = 1e-9
 # Rounds of the active set method per parameter at most, and the regularisation that keeps columns without excitation solvable.
@@ -80,7 +80,7 @@ class Rows:
         period = float(np.median(steps))
         cutoff = min(cutoff, _LARGEST_CUTOFF / period)
         psi, y = _native.regression_rows(arm.to_native(), t, q, tau, cutoff)
-        settled = _settled(t, _HOLE * period, _SETTLING / cutoff)
+        settled = _settled(t, _HOLE_PERIODS * period, _SETTLING / cutoff)
         settled &= np.isfinite(y).all(axis=1)
         rows = np.flatnonzero(settled)
         return cls(psi[rows], y[rows], rows + first)
@@ -113,12 +113,12 @@ class Fit:
     @property
     def cost(self) -> float:
         """Mean over the joints of the logarithm of the unexplained share, which is bounded from below."""
-        return float(np.mean(np.log(self.share + _EXPLAINED)))
+        return float(np.mean(np.log(self.share + _EXPLAINED_RESIDUAL_SHARE)))
 
     @property
     def closeness(self) -> float:
         """Mean over the joints of the logarithm of the unexplained share without lower bound, for readings that all explain nearly everything."""
-        return float(np.mean(np.log(self.share + _EXACT)))
+        return float(np.mean(np.log(self.share + _ZERO_RESIDUAL_SHARE)))
 
 
 class EquationError:

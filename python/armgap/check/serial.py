@@ -41,25 +41,25 @@ _MOST_INTERVALS = 4000
 # Number of rows that count as one independent row: neighbouring test functions overlap, and residuals are correlated over some tenths of a second.
 _CORRELATED = 12.0
 # Iterations in which the weights of the joints are set from their residuals.
-_ROUNDS = 4
+_WEIGHT_ITERATIONS = 4
 # Share of a joint's mean square torque that stays unexplained, from which other readings of the columns are tried. Friction that the model lacks
 # leaves up to a fifth on logs of real arms.
-_SUSPICIOUS = 0.3
+_SUSPICIOUS_SHARE = 0.3
 # Squared distance of the parameters from the arm file, per joint, from which other readings of the columns are tried. A joint has six or seven
 # identifiable parameters, so that a right arm file has a distance of about this size.
-_FAR = 8.0
+_SUSPICIOUS_DISTANCE = 8.0
 # Reduction of the squared distance from the arm file, to less than a third, from which a reading is right too: six standard deviations of one value.
 _RESTORED = 36.0
 # A reading of the columns is right where the cost falls by as much as if the unexplained part of one joint's torque fell to a third, and less than
 # `_EXPLAINS` of every joint's mean square torque stays unexplained, or half of the share with the log as it stands.
-_BETTER = 1.0
+_MIN_COST_DECREASE = 1.0
 _EXPLAINS = 0.15
 # Factor on the standard deviations of the last link's inertial parameters for an unknown load: its largest mass in masses of the last link.
 _LOADED = 30.0
 # Increase of the cost up to which a torque's factor is set to 1: friction alone determines no factor.
 _UNDECIDED = 10.0
 # Difference of two readings' costs, as a part of their gain, below which the readings are alike.
-_ALIKE = 0.02
+_ALIKE_COST_PART = 0.02
 
 # Range of factors on a torque that are gains, not other units.
 _NO_UNIT = (0.5, 2.0)
@@ -124,13 +124,15 @@ def contradictions(logs: Sequence[Log], arm: Arm, *, repair: bool = True) -> tup
         # The value of the controller's integral part at the start of a log is in no column.
         return Corrections(), []
     stands = fit(logs, arm)
-    if stands is None or (stands.share.max() < _SUSPICIOUS and stands.distance < _FAR * arm.n_joints):
+    if stands is None or (
+        stands.share.max() < _SUSPICIOUS_SHARE and stands.distance < _SUSPICIOUS_DISTANCE * arm.n_joints
+    ):
         return Corrections(), []
     # A load on the last link is no contradiction: no other reading is tried for torques that a load explains.
     loaded = fit(logs, _with_load(arm))
     if loaded is not None and loaded.cost < stands.cost:
         stands = loaded
-        if stands.share.max() < _SUSPICIOUS and stands.distance < _FAR * arm.n_joints:
+        if stands.share.max() < _SUSPICIOUS_SHARE and stands.distance < _SUSPICIOUS_DISTANCE * arm.n_joints:
             return Corrections(), []
     tried = [
         (reading, fit([reading.corrections.on_log(log) for log in logs], reading.corrections.on_arm(arm)))
@@ -140,7 +142,7 @@ def contradictions(logs: Sequence[Log], arm: Arm, *, repair: bool = True) -> tup
     if found:
         best, least = min(found, key=lambda pair: pair[1].cost)
         if _is_right(stands, least):
-            remedies = _alike(best, least.cost + _ALIKE * (stands.cost - least.cost), logs, arm)
+            remedies = _alike(best, least.cost + _ALIKE_COST_PART * (stands.cost - least.cost), logs, arm)
             return best.corrections, [_contradiction(stands, best, least, found, remedies)]
     # Torques that are computed by a controller have the unit of its gains, so no factor is sought.
     scaled = None if commanded else _factors(logs, arm)
@@ -159,14 +161,14 @@ def _with_load(arm: Arm) -> Arm:
 def _is_right(stands: Fit, other: Fit) -> bool:
     explains = other.share.max() < max(_EXPLAINS, 0.5 * stands.share.max())
     restores = stands.distance - other.distance > _RESTORED and other.distance < stands.distance / 3
-    return bool(explains and (restores or stands.cost - other.cost > _BETTER * stands.count))
+    return bool(explains and (restores or stands.cost - other.cost > _MIN_COST_DECREASE * stands.count))
 
 
 def _contradiction(
     stands: Fit, best: Reading, least: Fit, found: Sequence[tuple[Reading, Fit]], remedies: list[str]
 ) -> Check:
     for other, result in found:
-        if other is not best and result.cost - least.cost < _ALIKE * (stands.cost - least.cost):
+        if other is not best and result.cost - least.cost < _ALIKE_COST_PART * (stands.cost - least.cost):
             remedies += [remedy for remedy in other.remedies if remedy not in remedies]
     worst = int(np.argmax(stands.share - least.share))
     message = (
@@ -274,7 +276,7 @@ class _Rows:
         count = len(self.y)
         left = 0.01 * square
         theta = arm.theta
-        for _ in range(_ROUNDS):
+        for _ in range(_WEIGHT_ITERATIONS):
             weights = moved * count / left / _CORRELATED
             normal = np.einsum("j,jik->ik", weights, self.normal)
             right = np.einsum("j,ji->i", weights * factors, self.right) + precision * arm.theta

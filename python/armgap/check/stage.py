@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 # Difference of the mean log shares of unexplained torque of two readings below which predictions decide between them. A reading that explains less
 # than springs and contacts do, by this much, is rejected; not the reverse, for wrongly read gravity is equivalent to a spring in many logs.
-_CLOSE = 1.0
+_CLOSE_COST_DIFFERENCE = 1.0
 # Rows of the equation of motion that the comparison of readings needs.
 _FEWEST_ROWS = 100
 # Thresholds above which torque and position columns do not belong together. First numbers: unexplained share of what moves a joint (its torque, or
@@ -117,7 +117,7 @@ def _reading(now: Examined, horizon: float, repair: bool) -> Examined:
         return _applied(replace(now, arm=_doubted(now.arm, factors)), applied, said)
     odd = stands.share.max() >= _UNRELATED[0]
     elastic = _beside_elasticity(base, logs, now.arm) if suspects or odd else stands
-    suspects = [s for s in suspects if s.fit.cost < elastic.cost + _CLOSE]
+    suspects = [s for s in suspects if s.fit.cost < elastic.cost + _CLOSE_COST_DIFFERENCE]
     found = confirm(stands, suspects, now.training, now.holdout, now.arm, horizon)
     if found is None:
         return _applied(now, Corrections(), _strangers(elastic.share, now, horizon, 0))
@@ -205,7 +205,7 @@ def _prefers(
     factors: torque_unit.Factors, suspects: Sequence[Suspect], base: EquationError, now: Examined, horizon: float
 ) -> bool:
     """Return whether factors on torques explain the logs better than any other reading; predictions decide between similar ones."""
-    rivals = [s for s in suspects if base.of_torques(s.fit).closeness < factors.closeness + _CLOSE]
+    rivals = [s for s in suspects if base.of_torques(s.fit).closeness < factors.closeness + _CLOSE_COST_DIFFERENCE]
     if not rivals and not factors.doubtful:
         return True
     with_factors = _predicted(factors.corrections, now, horizon)

@@ -25,9 +25,9 @@ from armgap.several_joints import by_joint
 __all__ = ["acausal", "causal", "confirmed", "early", "explains_better", "taken_back"]
 
 # Largest shift of the torques that is tried [samples].
-_LARGEST = 8
+_MAX_SHIFT_SAMPLES = 8
 # Cut-off of the filters [rad/s]: a shift shows in the motion; a controller's response to encoder noise would hide it.
-_CUTOFF = 10.0
+_SHIFT_CUTOFF = 10.0
 # Smallest shift of the torques that counts, in samples. On simulated logs with hidden effects the estimate is -0.25 to 0.85 samples off, and
 # a lag of a drive cannot make the shift negative.
 _COUNTS = 0.6
@@ -45,9 +45,9 @@ _AT_FIRST = 0.8
 # predictions of the other joint worse.
 _MOSTLY = 0.5
 # Share of unexplained torque that counts as zero when shifts of the torques are compared.
-_EXACT = 1e-7
+_SHIFT_SHARE_FLOOR = 1e-7
 # Rows of the equation of motion that each half of a log needs for an estimate of the torques' shift.
-_FEWEST = 200
+_MIN_HALF_LOG_ROWS = 200
 # Delays of all joints are one shift of the file if they differ by less than this part of a sample, or of their standard deviations.
 _EQUAL = 0.5
 _EQUAL_SIGMAS = 3.0
@@ -58,12 +58,12 @@ _TAKEN_BACK = 0.7
 
 def acausal(logs: Sequence[Log], arm: Arm) -> int | None:
     """Return by how many samples the torques of all logs come late in the file; 0 if only a part of the logs shows it, None if none does."""
-    curves = [_curve(half, arm) for log in logs for half in _halves(Rows.of(log, arm, _CUTOFF))]
+    curves = [_curve(half, arm) for log in logs for half in _halves(Rows.of(log, arm, _SHIFT_CUTOFF))]
     says = [-_minimum(curve) > 0.5 * _COUNTS for curve in curves]
     if not any(says):
         return None
     late = -_minimum(np.sum(curves, axis=0))
-    if not _COUNTS <= late < _LARGEST or np.mean(says) < _AGREEING:
+    if not _COUNTS <= late < _MAX_SHIFT_SAMPLES or np.mean(says) < _AGREEING:
         return 0
     return max(1, round(late))
 
@@ -73,26 +73,31 @@ def _halves(rows: Rows) -> list[Rows]:
     middle = len(rows.y) // 2
     parts = [slice(0, middle), slice(middle, None)]
     halves = [Rows(rows.psi[part], rows.y[part], rows.samples[part]) for part in parts]
-    return [half for half in halves if len(half.y) >= _FEWEST]
+    return [half for half in halves if len(half.y) >= _MIN_HALF_LOG_ROWS]
 
 
 def _curve(rows: Rows, arm: Arm) -> NDArray[np.float64]:
     """Return the negative log-likelihood of every shift from -8 to 8 samples, with joints weighted by their unexplained torque."""
     low, high = bounds(arm)
     count = len(rows.y)
-    inner = slice(_LARGEST, count - _LARGEST)
+    inner = slice(_MAX_SHIFT_SAMPLES, count - _MAX_SHIFT_SAMPLES)
     base = EquationError([Rows(rows.psi[inner], rows.y[inner], rows.samples[inner])], arm)
-    shifted = [rows.y[_LARGEST - s : count - _LARGEST - s] for s in range(-_LARGEST, _LARGEST + 1)]
-    return np.array([count * float(np.sum(np.log(base.fit(low, high, [y]).share + _EXACT))) for y in shifted])
+    shifted = [
+        rows.y[_MAX_SHIFT_SAMPLES - s : count - _MAX_SHIFT_SAMPLES - s]
+        for s in range(-_MAX_SHIFT_SAMPLES, _MAX_SHIFT_SAMPLES + 1)
+    ]
+    return np.array(
+        [count * float(np.sum(np.log(base.fit(low, high, [y]).share + _SHIFT_SHARE_FLOOR))) for y in shifted]
+    )
 
 
 def _minimum(costs: NDArray[np.float64]) -> float:
     """Return the minimum of the parabola through the least cost and its neighbours: a shift [samples]."""
     i = int(np.argmin(costs))
     if i in (0, len(costs) - 1):
-        return float(i - _LARGEST)
+        return float(i - _MAX_SHIFT_SAMPLES)
     a, b, c = costs[i - 1 : i + 2]
-    return float(i - _LARGEST + 0.5 * (a - c) / (a - 2 * b + c))
+    return float(i - _MAX_SHIFT_SAMPLES + 0.5 * (a - c) / (a - 2 * b + c))
 
 
 def confirmed(
@@ -112,7 +117,7 @@ def confirmed(
 
     @cache
     def error(k: int) -> float:
-        if k == 0 or abs(k) > _LARGEST:
+        if k == 0 or abs(k) > _MAX_SHIFT_SAMPLES:
             return 1.0 if k == 0 else math.inf
         corrections = Corrections(shift={"tau": -k * period})
         read = [[corrections.on_log(log) for log in group] for group in (training, holdout)]
@@ -182,7 +187,7 @@ def early(training: Sequence[Log], holdout: Sequence[Log], arm: Arm, horizon: fl
     period = float(np.median(np.concatenate([np.diff(log.t) for log in training])))
     as_is = Refit.of(arm, training, holdout, horizon).bounded_by_motion()
     best, least = 0, 1.0
-    while best < _LARGEST:
+    while best < _MAX_SHIFT_SAMPLES:
         corrections = Corrections(shift={"tau": (best + 1) * period})
         read = [[corrections.on_log(log) for log in group] for group in (training, holdout)]
         missed = Refit.of(arm, read[0], read[1], horizon).against(as_is)

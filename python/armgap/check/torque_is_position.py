@@ -25,10 +25,10 @@ _NEAR_ZERO = 0.15
 # Longest response time of a servo [s]: its inertia term is smaller than this time squared. A hanging arm swings more slowly.
 _SLOWEST = 0.1
 # Largest share of the column's variance that the servo's equation may leave, and largest ratio to the share that the equation of motion leaves.
-_LEFT = 0.05
-_BETTER = 0.2
+_MAX_SERVO_RESIDUAL = 0.05
+_MAX_RESIDUAL_RATIO = 0.2
 # Largest number of samples of a log that are used.
-_MOST = 4000
+_MAX_LOG_SAMPLES = 4000
 
 
 def find(logs: Sequence[Log], arm: Arm) -> list[Check]:
@@ -41,7 +41,7 @@ def find(logs: Sequence[Log], arm: Arm) -> list[Check]:
     checks = []
     for j in range(arm.n_joints):
         left = max(_servo(log, j) for log in logs)
-        if left < _LEFT and left < _BETTER * float(torque[j]):
+        if left < _MAX_SERVO_RESIDUAL and left < _MAX_RESIDUAL_RATIO * float(torque[j]):
             message = (
                 f"`tau{j + 1}` follows `q{j + 1}` like the reference of a position controller, to {100 * left:.2g} % of its variance; "
                 f"as a torque {100 * min(float(torque[j]), 1.0):.0f} % of it stays unexplained"
@@ -61,7 +61,7 @@ def _in_any_unit(base: EquationError, arm: Arm) -> NDArray[np.float64]:
 
 def _servo(log: Log, j: int) -> float:
     """Return the share of a torque column's variance that ``q + a dq + b ddq`` leaves; 1 if the column is no position reference of a servo."""
-    t, q, tau = log.t[:_MOST], log.q[:_MOST, j], log.tau[:_MOST, j]
+    t, q, tau = log.t[:_MAX_LOG_SAMPLES], log.q[:_MAX_LOG_SAMPLES, j], log.tau[:_MAX_LOG_SAMPLES, j]
     variance = float(np.var(tau))
     if variance == 0 or np.ptp(q) == 0:
         return 1.0

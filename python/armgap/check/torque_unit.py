@@ -34,18 +34,18 @@ _GAIN = 2.0
 # Common factor on all columns that the arm file's parameters may be off by, up or down.
 _SCALED = 4.0
 # Largest factor on a torque that is repaired; larger factors are no plausible unit.
-_LARGEST = 2e3
+_MAX_REPAIRED_FACTOR = 2e3
 # Columns share a factor if their factors differ by less than this ratio.
-_ALIKE = 1.5
+_COMMON_FACTOR_RATIO = 1.5
 # Parameters may differ from the arm file by this factor while a column's factor is estimated.
-_TRUST = 2.0
-_ROUNDS = 4
+_PARAMETER_BOUND_FACTOR = 2.0
+_FACTOR_ITERATIONS = 4
 # Reduction of the mean log share of unexplained torque that a factor on torques needs; with a reduction below the second number predictions have
 # to agree: friction without bound takes much of a torque in another unit.
 _GAIN_IN_COST = 0.2
 _CLEAR_GAIN = 0.5
 # Share of unexplained torque above which a joint determines no factor: noise fed back by a controller, or a stop, makes most of its torque.
-_LEFT = 0.3
+_MAX_UNEXPLAINED_SHARE = 0.3
 # Where a factor leaves this share of a torque, a limit of the drive or an elastic torque is added to the model, and kept where it halves that share:
 # sound logs and factors alone leave 0.02 at most, drives that saturate 0.2 to 0.6 and behind their limit 0.01 to 0.05 (five development cases of six;
 # 0.35 in one that is hardly ever below its limit), springs and stops 0.1 to 0.4 and less than 0.03 with the elastic torque (three of five). Where
@@ -56,9 +56,9 @@ _CHANGE_TAKEN = 0.5
 # Standard deviations of the arm file beyond which friction is not that of the arm file.
 _SURE = 3.0
 # Share of unexplained torque below which a factor is exact: remaining errors are those of the arm file's parameters.
-_LEAST_SHARE = 1e-3
+_EXACT_FACTOR_SHARE = 1e-3
 # Quantiles of a torque's size at which a drive's limit is tried: a limit between two quantiles still explains what no factor does.
-_LEVELS = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95)
+_LIMIT_QUANTILES = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95)
 # Times [s] that a drive with a limited rate of torque may need for the range of its commands, each a quarter longer than the one before: the shortest
 # shows in no log, the longest leaves a constant torque. A rate between two of them is met to 12 %, which leaves far less torque unexplained than
 # columns of another arm do.
@@ -89,14 +89,14 @@ class Factors:
 
 def find(base: EquationError, logs: Sequence[Log], arm: Arm) -> Factors | None:
     """Return the factors that scale torque columns of the logs (`base`) to the arm file, or None; saturation of a drive is no factor."""
-    low, high = bounds(arm, _TRUST)
+    low, high = bounds(arm, _PARAMETER_BOUND_FACTOR)
     read = _read(base, logs, arm)
     base, factors = read.errors, read.factors
-    known = read.share < _LEFT
+    known = read.share < _MAX_UNEXPLAINED_SHARE
     odd = [j for j, c in enumerate(factors) if known[j] and not _within(c, _GAIN)]
     if not odd or np.any(factors[known] <= 0):
         return None
-    shared = len(odd) == int(known.sum()) and float(factors[known].max() / factors[known].min()) < _ALIKE
+    shared = len(odd) == int(known.sum()) and float(factors[known].max() / factors[known].min()) < _COMMON_FACTOR_RATIO
     if not shared and not known.all():
         return None
     applied = np.where(np.isin(np.arange(len(factors)), odd), factors, 1.0)
@@ -131,7 +131,7 @@ def _friction_stands(base: EquationError, arm: Arm, factor: float) -> bool:
 
 def _common(factors: NDArray[np.float64], share: NDArray[np.float64]) -> float:
     """Return the common factor of all columns: mean weighted by unexplained share, to which the variance of a joint's factor is proportional."""
-    weight = (1.0 - share) / np.maximum(share, _LEAST_SHARE)
+    weight = (1.0 - share) / np.maximum(share, _EXACT_FACTOR_SHARE)
     return math.exp(float(np.average(np.log(factors), weights=weight)))
 
 
@@ -140,7 +140,7 @@ def limited(logs: Sequence[Log], arm: Arm, joint: int) -> tuple[EquationError, F
 
     A limit in size far below the command looks like a small factor, a limit in rate like columns of another arm.
     """
-    low, high = bounds(arm, _TRUST)
+    low, high = bounds(arm, _PARAMETER_BOUND_FACTOR)
     fits = ((errors, errors.of_torques(errors.fit(low, high))) for _, errors in _at_limits(logs, arm, joint))
     return min(fits, key=lambda entry: entry[1].closeness)
 
@@ -172,7 +172,7 @@ def _read(base: EquationError, logs: Sequence[Log], arm: Arm) -> _Reading:
     A column in another unit may be the command of a drive that is limited, or of a joint with a spring or a stop: such a joint's factor is
     identifiable only together with the limit, or with the elastic torque.
     """
-    low, high = bounds(arm, _TRUST)
+    low, high = bounds(arm, _PARAMETER_BOUND_FACTOR)
 
     def model(errors: EquationError) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         factors = _factors(errors, low, high)
@@ -199,7 +199,7 @@ def _read(base: EquationError, logs: Sequence[Log], arm: Arm) -> _Reading:
 def _at_limits(logs: Sequence[Log], arm: Arm, joint: int) -> Iterator[tuple[list[Log], EquationError]]:
     """Yield the logs with one joint's torques limited in size or in rate, and their equation error, for each limit that is tried."""
     tau = [log.tau[:, joint] for log in logs]
-    sizes = np.quantile(np.abs(np.concatenate(tau)), _LEVELS)
+    sizes = np.quantile(np.abs(np.concatenate(tau)), _LIMIT_QUANTILES)
     rates = max(float(np.ptp(x)) for x in tau) / np.array(_SLEW_TIMES)
     for size in sizes:
         yield _delivered(logs, arm, joint, [np.clip(x, -size, size) for x in tau])
@@ -237,7 +237,7 @@ def _within(factor: float, bound: float) -> bool:
 def _factors(base: EquationError, low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the factor of every torque column: shape of the torques by parameters within bounds, size by the arm file."""
     factors = base.expected()
-    for _ in range(_ROUNDS):
+    for _ in range(_FACTOR_ITERATIONS):
         if np.any(factors <= 0):
             break
         theta = base.with_factors(low, high, factors).theta
@@ -252,7 +252,7 @@ def _said(factors: NDArray[np.float64], odd: Sequence[int], shared: bool) -> tup
     severity: Severity = "repaired"
     if shared and largest < _SCALED:
         severity = "warning"
-    elif largest > _LARGEST:
+    elif largest > _MAX_REPAIRED_FACTOR:
         severity = "error"
     return corrections, said(corrections.factor, severity, shared=shared)
 

@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 #: Largest number of custom effects in one diagnosis.
 MAX_CUSTOM_EFFECTS = 4
 #: Half width, in samples, of the local cubic that gives velocities where a log has none.
-_HALF_WIDTH = 4
+_VELOCITY_HALF_WIDTH = 4
 _NAME = re.compile(r"[a-z][a-z0-9_]*")
 
 
@@ -159,7 +159,7 @@ def _check(effects: Sequence[CustomEffect], joints: int) -> None:
 
 def _evaluated(effect: CustomEffect, log: Log) -> Array:
     fix = np.ascontiguousarray
-    dq = log.dq if log.dq is not None else _native.velocity(fix(log.t), fix(log.q), "local-cubic", _HALF_WIDTH)
+    dq = log.dq if log.dq is not None else _native.velocity(fix(log.t), fix(log.q), "local-cubic", _VELOCITY_HALF_WIDTH)
     torque = np.asarray(effect.torque(log.t - log.t[0], log.q, dq, log.tau), dtype=float)
     if torque.shape != log.t.shape:
         raise OptionError(

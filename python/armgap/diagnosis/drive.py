@@ -33,16 +33,16 @@ _KERNEL_S = 0.02
 # Smallest standard deviation of the Gaussian kernel, in sample periods: narrower kernels have no second derivative on the samples.
 _KERNEL_PERIODS = 2.0
 # Half width of the Gaussian kernel in standard deviations: 6e-5 of its weight lies beyond.
-_REACH = 4.0
+_KERNEL_REACH = 4.0
 # Range of delays that are searched [s]: field buses and current loops take 1 to 30 ms; a measured torque before its command is a time shift of the
 # file.
 _EARLIEST_S, _LATEST_S = -0.05, 0.1
 # Step of the grid of delays, in standard deviations of the Gaussian kernel: within a step the cost is a parabola.
 _GRID = 0.25
 # Gauss-Newton iterations for a drive's delay; from within a step of the grid the delay has converged to 1e-6 s after four iterations.
-_ROUNDS = 8
+_DELAY_ITERATIONS = 8
 # Length of a hole in the samples, in sample periods, at which a log is split, equal to that for the equation of motion.
-_HOLE = 3.0
+_HOLE_PERIODS = 3.0
 # Variation of a command, as a part of the measured torque, below which it determines neither gain nor delay.
 _VARIES = 0.01
 # Length of a block of torque residuals that counts as one independent value [s]: torques are correlated over some tenths of a second.
@@ -81,7 +81,7 @@ class _Stretch:
         step = float(np.median(np.diff(t)))
         sigma = max(_KERNEL_S, _KERNEL_PERIODS * step)
         even = np.arange(t[0], t[-1], step)
-        half = int(np.ceil(_REACH * sigma / step))
+        half = int(np.ceil(_KERNEL_REACH * sigma / step))
         inside = even[half:-half]
         if not len(inside) or inside[-1] - inside[0] <= _LATEST_S - _EARLIEST_S:
             return None
@@ -164,7 +164,7 @@ class Drive:
 
         sigma = max(_KERNEL_S, _KERNEL_PERIODS * logs[0].sample_period)
         delay = float(min(np.arange(_EARLIEST_S, _LATEST_S, _GRID * sigma), key=lambda d: fitted(float(d))[1]))
-        for _ in range(_ROUNDS):
+        for _ in range(_DELAY_ITERATIONS):
             values = np.append(delay, fitted(delay)[0])
             jacobian = [_jacobian(s, values) for s in stretches]
             residual = [s.measured - s.columns(delay) @ values[1:] for s in stretches]
@@ -200,7 +200,7 @@ class Drive:
 def _stretches(log: Log, joint: int) -> list[_Stretch]:
     """Return the stretches of a log between its holes."""
     assert log.tau_meas is not None
-    edges = [0, *(np.flatnonzero(np.diff(log.t) > _HOLE * log.sample_period) + 1).tolist(), len(log)]
+    edges = [0, *(np.flatnonzero(np.diff(log.t) > _HOLE_PERIODS * log.sample_period) + 1).tolist(), len(log)]
     found = [
         _Stretch.of(log.t[a:b], log.q[a:b, joint], log.tau[a:b, joint], log.tau_meas[a:b, joint])
         for a, b in pairwise(edges)

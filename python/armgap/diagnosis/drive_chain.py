@@ -43,7 +43,7 @@ _HELD, _STRAIGHT, _ENDED = 0.0, 0.5, 1.0
 # Delay of a drive, in sample periods, below which it counts as none: samples do not show at which time between them a measured torque changes.
 _AT_ONCE = 0.6
 # Difference of the positions of the two encoders, as a part of the motion, below which the second encoder shows nothing of a transmission.
-_APART = 1e-9
+_MIN_ENCODER_DIFFERENCE = 1e-9
 
 
 class ChainValue(TypedDict):
@@ -127,7 +127,7 @@ class _Case:
             ):
                 yield from (_Signal("drive", j, after) for after in (_HELD, _STRAIGHT, _ENDED))
             if all(log.q_link is not None for log in logs) and any(
-                np.ptp(log.q_link[:, j] - log.q[:, j]) > _APART * np.ptp(log.q[:, j])
+                np.ptp(log.q_link[:, j] - log.q[:, j]) > _MIN_ENCODER_DIFFERENCE * np.ptp(log.q[:, j])
                 for log in logs
                 if log.q_link is not None
             ):

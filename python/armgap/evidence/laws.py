@@ -25,13 +25,13 @@ from armgap.log.log import Log
 __all__ = ["laws"]
 
 #: Largest number of windows that evidence for a cause is taken from, over all logs.
-_WINDOWS = 160
+_MAX_EVIDENCE_WINDOWS = 160
 #: Smallest half width of the local cubics that give second derivatives, as a number of samples and as a time.
 HALF_SAMPLES, HALF_S = 8, 0.016
 #: Largest number of ranges of the variable that evidence is averaged over, fewest samples in a range, fewest in total, and most points drawn.
-BINS, FEWEST, _ENOUGH, POINTS = 24, 4, 40, 400
+BINS, FEWEST, _MIN_MOVING_SAMPLES, POINTS = 24, 4, 40, 400
 #: Speed below which a joint counts as at rest, where dry friction hides any torque, as a part of the 99th percentile of its speed.
-_REST = 0.01
+_REST_SPEED_RATIO = 0.01
 #: Time before and after an event from which its evidence is taken, in durations of the event, and shortest duration that is assumed.
 EVENT, EVENT_S = 4.0, 0.1
 #: Two-sided 95 % quantile of the normal distribution, in standard deviations.
@@ -185,7 +185,7 @@ def _law(model: Hypothesis, cause: EffectInstance, logs: Sequence[Log]) -> Law:
         return entry
     shown = joint - 1 if joint is not None else _most_moved(points)
     moves = _moves(points.dq[:, shown])
-    if np.count_nonzero(moves) < _ENOUGH:
+    if np.count_nonzero(moves) < _MIN_MOVING_SAMPLES:
         return entry  # too few samples in motion for means
     variable = VARIABLES.get(effect, _LAW_TORQUE)
     if not np.any(points.law[moves, shown]):
@@ -213,7 +213,7 @@ def _law(model: Hypothesis, cause: EffectInstance, logs: Sequence[Log]) -> Law:
 def _moves(dq: Array) -> NDArray[np.bool_]:
     """Return a mask of the samples in which each joint moves."""
     speed = np.abs(dq)
-    return np.asarray(speed > _REST * np.quantile(speed, 0.99))
+    return np.asarray(speed > _REST_SPEED_RATIO * np.quantile(speed, 0.99))
 
 
 def _most_moved(points: EvidenceSamples) -> int:
@@ -230,7 +230,7 @@ def _points(
     failed: list[str] = []
     whole = sum(log.duration for log in logs)
     for log in logs:
-        wanted = max(1, round(_WINDOWS * log.duration / whole))
+        wanted = max(1, round(_MAX_EVIDENCE_WINDOWS * log.duration / whole))
         try:
             comparison = _CauseComparison(model, cause, log)
         except ValueError as error:

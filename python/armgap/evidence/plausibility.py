@@ -18,7 +18,7 @@ from armgap.evidence.hypothesis import Array, Hypothesis
 __all__ = ["plausibility"]
 
 #: Poses per joint at which the inertia matrix is checked.
-_POSES = 24
+_POSES_PER_TURN = 24
 
 
 class Plausibility(TypedDict):
@@ -73,7 +73,7 @@ def _largest_compliance(model: Hypothesis) -> float | None:
 
 def _poses(arm: Arm) -> Array:
     """Return poses over a whole turn of every joint, shape (n_poses, n_joints)."""
-    turn = np.linspace(-np.pi, np.pi, _POSES, endpoint=False)
+    turn = np.linspace(-np.pi, np.pi, _POSES_PER_TURN, endpoint=False)
     grid = np.meshgrid(*([turn] * arm.n_joints), indexing="ij")
     return np.column_stack([g.ravel() for g in grid])
 

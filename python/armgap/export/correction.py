@@ -14,7 +14,7 @@ __all__ = ["STAGES", "correct"]
 #: Stages of a diagnosis that can be exported.
 STAGES = ("with_causes", "refit")
 #: Relative difference up to which parameters of arm file and diagnosis count as equal.
-_SAME = 1e-9
+_EQUAL_PARAMETER_TOLERANCE = 1e-9
 
 
 def correct(diagnosis: Diagnosis, arm: Arm, *, stage: str = "with_causes", keep_lengths: bool = False) -> Corrected:
@@ -69,7 +69,7 @@ def _check(diagnosis: Diagnosis, arm: Arm, stage: str) -> None:
             file=arm.path,
         )
     for name, stated in zip(arm.parameter_names, arm.theta, strict=True):
-        if abs(nominal[name].value - stated) > _SAME * max(1.0, abs(stated)):
+        if abs(nominal[name].value - stated) > _EQUAL_PARAMETER_TOLERANCE * max(1.0, abs(stated)):
             raise ExportError(
                 f"is {stated:.6g} in the arm file, but the diagnosis was made with {nominal[name].value:.6g}",
                 remedy="give the arm file of the diagnosis",

@@ -32,13 +32,13 @@ Array = NDArray[np.float64]
 
 SCHEMA = "armgap.randomization/1"
 #: Half width of the ranges for domain randomisation, in standard deviations: 95 % of a normal distribution.
-_REACH = 2.0
+_RANGE_HALF_WIDTH = 2.0
 #: Lower end of a range, as a share of the value, for a parameter that must not be negative, or must be positive for a body.
-_LEAST_SHARE = 0.1
+_LOWER_END_SHARE = 0.1
 #: Values tried for `k`, the information in one sample of the torques.
 _INFORMATION = 10.0 ** np.arange(0.0, 12.0, 0.25)
 #: Step of finite differences by inertial parameters, in their standard deviations.
-_STEP = 1e-6
+_INERTIAL_STEP_SIGMAS = 1e-6
 _ABOUT_COM = ("mass", "com_x", "com_y", "com_z", "ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 _COM_UNITS = ("kg", "m", "m", "m", *["kg m^2"] * 6)
 _POSITIVE = ("mass", "ixx", "iyy", "izz")
@@ -61,7 +61,7 @@ def randomization(model: Corrected, *, draws: int = 20, seed: int = 1) -> str:
         "version": __version__,
         "arm": model.arm.name,
         "stage": model.stage,
-        "reach": _REACH,
+        "reach": _RANGE_HALF_WIDTH,
     }
     if isinstance(model, CorrectedSerial):
         spread = covariance(model)
@@ -97,12 +97,12 @@ def covariance(model: CorrectedSerial) -> Array:
 
 
 def _entry(where: dict[str, Any], nominal: float, sd: float, unit: str, *, positive: bool = False) -> dict[str, Any]:
-    low, high = nominal - _REACH * sd, nominal + _REACH * sd
+    low, high = nominal - _RANGE_HALF_WIDTH * sd, nominal + _RANGE_HALF_WIDTH * sd
     return {
         **where,
         "nominal": nominal,
         "sd": sd,
-        "low": max(low, _LEAST_SHARE * nominal) if positive else low,
+        "low": max(low, _LOWER_END_SHARE * nominal) if positive else low,
         "high": high,
         "unit": unit,
     }
@@ -117,7 +117,7 @@ def _of_links(model: CorrectedSerial, spread: Array) -> Iterable[dict[str, Any]]
     for k, (name, ten) in enumerate(zip(model.chain.link_names, model.bodies.inertial, strict=True)):
         rows = slice(10 * k, 10 * k + 10)
         size = np.sqrt(np.diag(spread[rows, rows]))
-        steps = _STEP * np.where(size > 0, size, 1.0)
+        steps = _INERTIAL_STEP_SIGMAS * np.where(size > 0, size, 1.0)
         slopes = np.array(
             [_about_com(ten + h * e) - _about_com(ten - h * e) for h, e in zip(steps, np.eye(10), strict=True)]
         )
@@ -161,7 +161,9 @@ def _draw(model: CorrectedSerial, spread: Array, rng: np.random.Generator) -> di
     center = np.concatenate([model.bodies.inertial.ravel(), model.bodies.rotor])
     values, vectors = np.linalg.eigh(spread)
     drawn = center + vectors @ (np.sqrt(np.maximum(values, 0.0)) * rng.standard_normal(len(values)))
-    drawn[10 * n :] = np.where(center[10 * n :] > 0, np.maximum(drawn[10 * n :], _LEAST_SHARE * center[10 * n :]), 0.0)
+    drawn[10 * n :] = np.where(
+        center[10 * n :] > 0, np.maximum(drawn[10 * n :], _LOWER_END_SHARE * center[10 * n :]), 0.0
+    )
     sigma = np.sqrt(np.diag(spread))
     bodies = nearest_bodies(drawn, drawn, sigma, model.regressor, np.zeros((n, 10)), exact=False)
     friction = model.theta[11 * n :] + model.sigma[11 * n :] * rng.standard_normal(2 * n)

@@ -51,7 +51,7 @@ _FEWEST_BEFORE, _FEWEST_ON = 3, 3
 _FEWEST_ROBOTS = 4
 # Share of the evidence for a ramp that has to remain with any one visit left out. A ramp over three visits keeps 0.6 of it without the last; an
 # apparent ramp from one outlying visit keeps nothing.
-_STAYS = 0.5
+_MIN_REMAINING_EVIDENCE = 0.5
 # Relative standard error from which an estimate is left out, as its logarithm is undetermined.
 _VAGUE = 0.3
 # Degrees of freedom from which the scatter of visits counts as known exactly.
@@ -59,7 +59,7 @@ _KNOWN = 1e6
 # Largest autocorrelation: beyond it scatter is a random walk, which no test tells from a drift.
 _MOST_CORRELATION = 0.9
 # Squared change of a logarithm that counts as zero, and accuracy of the fleet's scatter, relative to the largest change between two visits.
-_NOTHING, _CLOSE = 1e-30, 1e-6
+_ZERO_SQUARED_CHANGE, _SCATTER_ACCURACY = 1e-30, 1e-6
 # Distance from the fleet's median, in robust standard deviations, from which a robot counts as different from the others.
 _ODD = 5.0
 # Share of robots far from the median from which the fleet counts as one of several models of robots, and no robot as different.
@@ -119,7 +119,7 @@ def drifts(values: Array, sigma: Array | None = None, *, tests: int | None = Non
         square = error[robot, visits] ** 2
         before = correlation**2 * np.roll(square, 1)
         before[0] = -(correlation**2) * square[0]  # the first equation is scaled by sqrt(1 - rho^2)
-        weight = 1.0 / (dispersion[robot] * (scatter**2 * (1.0 + correlation) + square + before) + _NOTHING)
+        weight = 1.0 / (dispersion[robot] * (scatter**2 * (1.0 + correlation) + square + before) + _ZERO_SQUARED_CHANGE)
         equations = _Equations(series[robot, visits], weight, correlation)
         found.append(_drift(equations, visits, int(robot), float(freedom[robot]), allowed))
     return sorted((drift for drift in found if drift is not None), key=lambda drift: -drift.evidence)
@@ -184,7 +184,7 @@ def fleet_scatter(series: Array, error: Array) -> tuple[float, Array, Array]:
 
     largest = float(np.sqrt(np.nanmax(steps[0])))
     low, high = 0.0, largest
-    while high - low > _CLOSE * largest:
+    while high - low > _SCATTER_ACCURACY * largest:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if excess(middle) > 0 else (low, middle)
     raw = _dispersions(steps, high)
@@ -195,7 +195,7 @@ def fleet_scatter(series: Array, error: Array) -> tuple[float, Array, Array]:
     beside = _dispersions(_steps(np.array([_without_ramp(row) for row in series]), error), high)[seen]
     free = np.maximum(each[seen] - 2.0, 1.0)
     prior[seen] *= np.minimum(1.0, np.count_nonzero(seen) * _exceedance(beside * each[seen] / free, free, agreed))
-    dispersion = np.where(seen, (prior + each * raw) / np.maximum(prior + each, _NOTHING), 1.0)
+    dispersion = np.where(seen, (prior + each * raw) / np.maximum(prior + each, _ZERO_SQUARED_CHANGE), 1.0)
     return high, dispersion, np.minimum(each + prior, each.sum())
 
 
@@ -235,7 +235,7 @@ def _steps(series: Array, error: Array) -> tuple[Array, Array]:
 def _dispersions(steps: tuple[Array, Array], scatter: float) -> Array:
     """Return for each robot the mean square difference over its expectation from a scatter and the estimates' errors."""
     square, errors = steps
-    share = square / (2.0 * scatter**2 + errors + _NOTHING)
+    share = square / (2.0 * scatter**2 + errors + _ZERO_SQUARED_CHANGE)
     return np.asarray(np.nansum(share, axis=1) / np.maximum(np.count_nonzero(np.isfinite(square), axis=1), 1))
 
 
@@ -257,7 +257,7 @@ def _prior_freedom(dispersion: Array, freedom: Array) -> float:
     """
     if len(dispersion) < _FEWEST_ROBOTS:
         return _KNOWN
-    logs = np.log(np.maximum(dispersion, _NOTHING))
+    logs = np.log(np.maximum(dispersion, _ZERO_SQUARED_CHANGE))
     half = freedom / 2.0
     chance = float(np.median(1.0 / half + 1.0 / (2.0 * half**2) + 1.0 / (6.0 * half**3)))
     spread = (_MAD * float(np.median(np.abs(logs - np.median(logs))))) ** 2
@@ -361,7 +361,7 @@ def _drift(equations: _Equations, visits: NDArray[np.intp], robot: int, freedom:
     evidence = np.abs(slopes) / deviations
     best = int(np.argmax(evidence))
     needed = threshold(allowed, length, freedom)
-    if evidence[best] <= needed or equations.without_one(best) < _STAYS * evidence[best]:
+    if evidence[best] <= needed or equations.without_one(best) < _MIN_REMAINING_EVIDENCE * evidence[best]:
         return None
     onset = int(visits[best + _FEWEST_BEFORE])
     return Drift(robot, onset, float(np.expm1(slopes[best])), float(evidence[best]), needed)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 __all__ = ["fleet_document", "moved", "plain_time"]
 
 # Charts and table rows that the fleet's page shows at most; the tables on disk hold all.
-_CHARTS, _ROWS = 6, 40
+_CHARTS, _MAX_TABLE_ROWS = 6, 40
 _EMPTY = "-"
 _MIDNIGHT = "T00:00:00"
 
@@ -109,12 +109,12 @@ def _causes(summary: pl.DataFrame) -> Section:
             Bar(len(r["robots"]) / robots, f"{len(r['robots'])} of {robots}", charts.AFTER),
             str(r["entries"]),
             figure(r["probability"], 2) if r["probability"] is not None else _EMPTY,
-            ", ".join(r["robots"][:_ROWS]) + (" …" if len(r["robots"]) > _ROWS else ""),
+            ", ".join(r["robots"][:_MAX_TABLE_ROWS]) + (" …" if len(r["robots"]) > _MAX_TABLE_ROWS else ""),
         )
         for r in groups.sort(["entries", "what", "joint"], descending=[True, False, False]).to_dicts()
     ]
     header = ("cause, or verdict without one", "robots", "entries", "median probability", "which")
-    return Section("Robots by cause", tables=[Table(header, rows[:_ROWS])])
+    return Section("Robots by cause", tables=[Table(header, rows[:_MAX_TABLE_ROWS])])
 
 
 def _cause(what: str, joint: int | None) -> str:
@@ -144,7 +144,7 @@ def _moving(parameters: pl.DataFrame, moves: list[Move]) -> Section:
             f"{m.drift.evidence:.1f}",
             f"{m.drift.threshold:.1f}",
         )
-        for m in moves[:_ROWS]
+        for m in moves[:_MAX_TABLE_ROWS]
     ]
     tables = [Table(header, rows)] if rows else []
     points = [] if rows else ["Nothing drifts that these visits can tell."]
@@ -174,7 +174,10 @@ def _odd(found: list[Odd]) -> Section:
         "A robot is odd if its usual value (median over its visits) lies more than five robust standard deviations from the fleet's median. "
         "Where more than a fifth of the robots do, they are taken for arms of several models, and nothing is said."
     )
-    rows = [(o.robot, _named(o.of, o.name), figure(o.usual), figure(o.fleet), f"{o.apart:+.1f}") for o in found[:_ROWS]]
+    rows = [
+        (o.robot, _named(o.of, o.name), figure(o.usual), figure(o.fleet), f"{o.apart:+.1f}")
+        for o in found[:_MAX_TABLE_ROWS]
+    ]
     tables = (
         [Table(("robot", "parameter", "its median", "the fleet's", "robust standard deviations"), rows)] if rows else []
     )
@@ -185,7 +188,9 @@ def _failures(failed: pl.DataFrame) -> Section | None:
     if not failed.height:
         return None
     rows: list[tuple[str, ...]] = [(r["robot"], plain_time(r["time"]), r["error"]) for r in failed.to_dicts()]
-    tables = [Table(("robot", "time", "why"), rows[:_ROWS])]
-    if rows[_ROWS:]:
-        tables.append(Table(("robot", "time", "why"), rows[_ROWS:], fold=f"{len(rows) - _ROWS} more"))
+    tables = [Table(("robot", "time", "why"), rows[:_MAX_TABLE_ROWS])]
+    if rows[_MAX_TABLE_ROWS:]:
+        tables.append(
+            Table(("robot", "time", "why"), rows[_MAX_TABLE_ROWS:], fold=f"{len(rows) - _MAX_TABLE_ROWS} more")
+        )
     return Section("Entries without a diagnosis", tables=tables)

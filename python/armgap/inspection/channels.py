@@ -18,11 +18,11 @@ if not TYPE_CHECKING:
     __getattr__ = old_names(__name__)
 
 # Largest number of changes between samples from which the step of a channel is determined.
-_ENOUGH = 200_000
+_MAX_SAMPLE_CHANGES = 200_000
 # Largest number of changes of a channel between samples, the smallest ones, to which its step is fitted.
 _SMALLEST = 2000
 # Changes of a channel are whole multiples of a step if at least this share of them (second) lies this close (first, in steps).
-_CLOSE, _MOST = 0.05, 0.97
+_MULTIPLE_TOLERANCE, _WHOLE_MULTIPLES_SHARE = 0.05, 0.97
 # Smallest number of samples in a row at its extreme for which a torque counts as cut off.
 _FLAT_SAMPLES = 5
 # Distance from a torque's extreme, as a part of the largest absolute torque, within which a sample counts as at the extreme.
@@ -112,8 +112,8 @@ def step_of(values: NDArray[np.float64]) -> float | None:
     >>> round(step_of(q), 9), step_of(np.sin(np.arange(400) / 5.0))
     (0.002, None)
     """
-    moved = np.abs(np.diff(values[:_ENOUGH]))
-    moved = np.sort(moved[moved > 1e-12 * max(float(np.abs(values[:_ENOUGH]).max()), 1e-300)])[:_SMALLEST]
+    moved = np.abs(np.diff(values[:_MAX_SAMPLE_CHANGES]))
+    moved = np.sort(moved[moved > 1e-12 * max(float(np.abs(values[:_MAX_SAMPLE_CHANGES]).max()), 1e-300)])[:_SMALLEST]
     if len(moved) < 20:
         return None
     # The smallest change seen may itself be several steps; the largest step that fits is taken.
@@ -128,12 +128,12 @@ def _fitted(moved: NDArray[np.float64], step: float) -> float | None:
         if near.any():
             step = float(np.sum(moved[near]) / np.sum(multiples[near]))
     off = np.abs(moved / step - np.round(moved / step))
-    return step if float(np.mean(off < _CLOSE)) > _MOST else None
+    return step if float(np.mean(off < _MULTIPLE_TOLERANCE)) > _WHOLE_MULTIPLES_SHARE else None
 
 
 def _smallest(values: NDArray[np.float64]) -> float:
     """Return the size of changes between samples at rest, for a channel without steps."""
-    moved = np.abs(np.diff(values[:_ENOUGH]))
+    moved = np.abs(np.diff(values[:_MAX_SAMPLE_CHANGES]))
     moved = moved[moved > 0]
     return float(np.quantile(moved, 0.05)) if len(moved) else 0.0
 

@@ -31,12 +31,12 @@ if not TYPE_CHECKING:
 
 #: Initial variance of a parameter in recursive least squares, in squares of its SI unit: so large that it does not matter.
 _P0 = 1e9
-_CUTOFF = 50.0  # cut-off of the filters of the regression, rad/s
+_REGRESSION_CUTOFF = 50.0  # cut-off of the filters of the regression, rad/s
 _BUDGET = 200_000  # largest number of samples of a log that are used
 # RMS of the white torque error, as a part of the RMS torque, for which standard deviations of parameters are stated.
 _ERROR = 0.01
 # Part of the largest eigenvalue of the information matrix below which an eigenvalue counts as zero, within rounding.
-_NOTHING = 1e-14
+_EIGENVALUE_TOLERANCE = 1e-14
 # Standard deviation, as a part of the value, below which a parameter counts as well excited, and from which as not excited.
 _WELL, _HARDLY = 0.05, 0.5
 
@@ -95,7 +95,7 @@ def excitation(log: Log, arm: Arm) -> Excitation:
     information = sum((_information(part, arm) for part in parts), np.zeros((len(scale), len(scale))))
     scaled = information * np.outer(scale, scale)
     values, vectors = np.linalg.eigh((scaled + scaled.T) / 2)
-    floor = _NOTHING * values[-1]
+    floor = _EIGENVALUE_TOLERANCE * values[-1]
     torque = float(np.sqrt(np.mean([np.mean(part.tau**2) for part in parts])))
     with np.errstate(divide="ignore"):
         spread = np.sqrt((vectors**2) @ (1.0 / np.maximum(values, floor)))
@@ -113,7 +113,7 @@ def excitation(log: Log, arm: Arm) -> Excitation:
 def _information(log: Log, arm: Arm) -> NDArray[np.float64]:
     """Return the information matrix ``sum psi' psi`` of a log's filtered dynamic regression."""
     t, q, tau = (np.ascontiguousarray(x) for x in (log.t, log.q, log.tau))
-    estimator = Estimator(arm, scheme="filtered-dynamic", cutoff=_CUTOFF, p0=_P0)
+    estimator = Estimator(arm, scheme="filtered-dynamic", cutoff=_REGRESSION_CUTOFF, p0=_P0)
     estimator.run(q, tau, _native.velocity(t, q, "local-cubic", 3), t=t)
     values, vectors = np.linalg.eigh(estimator.covariance)
     information = np.maximum(1.0 / np.maximum(values, np.finfo(float).tiny) - 1.0 / _P0, 0.0)

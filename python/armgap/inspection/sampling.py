@@ -14,7 +14,7 @@ GAP_PERIODS = 3.0
 """Length of a hole in the samples, in sample periods, from which it counts as a gap."""
 
 #: Largest number of gaps that are listed.
-_LISTED = 5
+_LISTED_GAPS = 5
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ def sampling(log: Log) -> Sampling:
     period = float(np.median(steps))
     gaps = np.flatnonzero(steps > GAP_PERIODS * period)
     even = steps if not len(gaps) else np.delete(steps, gaps)
-    widest = gaps[np.argsort(steps[gaps])[::-1][:_LISTED]]
+    widest = gaps[np.argsort(steps[gaps])[::-1][:_LISTED_GAPS]]
     return Sampling(
         samples=len(log),
         duration_s=log.duration,

@@ -27,7 +27,7 @@ BUDGET = 24_000
 STRETCH_S = 2.0
 """Length of a stretch of a long log [s]."""
 
-_FEWEST = 4  # number of stretches that a budget holds at least, whatever their length
+_MIN_STRETCHES = 4  # number of stretches that a budget holds at least, whatever their length
 _POSITIONS = 12
 _SPEEDS = 6  # classes of speed below the top speed, half a decade each
 _TORQUES = 8
@@ -84,7 +84,7 @@ def choose(logs: Sequence[Log], budget: int = BUDGET, *, horizon: float = 0.25) 
 def _cut(index: int, log: Log, length_s: float, budget: int) -> list[tuple[int, int, int]]:
     """Return stretches as ``(log, first, last)``, each within a share of the budget and without gaps in time."""
     period = log.sample_period
-    rows = max(2, min(round(length_s / period), budget // _FEWEST))
+    rows = max(2, min(round(length_s / period), budget // _MIN_STRETCHES))
     gaps = np.flatnonzero(np.diff(log.t) > 3 * period) + 1
     edges = [0, *gaps.tolist(), len(log)]
     return [

@@ -50,7 +50,7 @@ TRAINED = 0.6
 #: Widths of the smoothed sign of friction that a diagnosis may choose, in RMS speeds of the motion.
 SMOOTHED = (0.01, 0.05)
 #: Gauss-Newton steps in which a rival is fitted after the first-order fit.
-_STEPS = 8
+_RIVAL_GAUSS_NEWTON_STEPS = 8
 #: Decrease of the cost by a Gauss-Newton step, as a part of the cost before, below which the fit of a rival has converged.
 SETTLED = 0.02
 #: Effects that act on the encoders' readings.
@@ -280,7 +280,7 @@ class PredictedMotion:
             columns.append(delayed - self.predicted(model.theta, model.effects, True))
         return columns
 
-    def outcome(self, pair: HypothesisPair, steps: int = _STEPS) -> Outcome:
+    def outcome(self, pair: HypothesisPair, steps: int = _RIVAL_GAUSS_NEWTON_STEPS) -> Outcome:
         """Return the evidence that the motion is expected to give between two models; zero if one of them cannot be simulated along it.
 
         Parameters

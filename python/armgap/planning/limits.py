@@ -24,7 +24,7 @@ TORQUE_MARGIN = 0.8
 #: Part of the torque limit that the feed-forward torque may use under every model with an effect in question.
 TORQUE_MOST = 0.95
 #: Half width, in samples, of the local cubics by which the logs' accelerations are estimated.
-_HALF_WIDTH = 10
+_ACCELERATION_HALF_WIDTH = 10
 #: Quantile of the logs' estimated accelerations that is taken as their largest, as the estimates scatter.
 COVERED = 0.995
 _REMEDY = "add a [limits] table with position_min, position_max, speed and acceleration"
@@ -96,7 +96,7 @@ def _covered(arm: Arm, data: dict[str, Any]) -> MotionLimits:
 
 def _joint_covered(arm: Arm, data: dict[str, Any], joint: int) -> tuple[float, float, float, float]:
     edges = {r["variable"]: r["edges"] for r in data.get("regimes") or [] if r["joint"] == joint}
-    curves = [s for s in data.get("series") or [] if s["joint"] == joint and len(s["t"]) > 4 * _HALF_WIDTH]
+    curves = [s for s in data.get("series") or [] if s["joint"] == joint and len(s["t"]) > 4 * _ACCELERATION_HALF_WIDTH]
     position, speed = edges.get(f"q{joint}"), edges.get(f"abs(dq{joint})")
     found = [np.abs(_acceleration(s)) for s in curves]
     if not (position and speed and found):
@@ -116,9 +116,11 @@ def _acceleration(curve: dict[str, Any]) -> Array:
     gaps = np.flatnonzero(np.diff(t) > 1.5 * np.median(np.diff(t))) + 1
     found = []
     for stretch in np.split(np.arange(len(t)), gaps):
-        if len(stretch) > 4 * _HALF_WIDTH:
+        if len(stretch) > 4 * _ACCELERATION_HALF_WIDTH:
             times = np.ascontiguousarray(t[stretch])
-            speed = _native.velocity(times, np.ascontiguousarray(q[stretch][:, None]), "local-cubic", _HALF_WIDTH)
-            rate = _native.velocity(times, np.ascontiguousarray(speed), "local-cubic", _HALF_WIDTH)
-            found.append(rate[_HALF_WIDTH:-_HALF_WIDTH, 0])
+            speed = _native.velocity(
+                times, np.ascontiguousarray(q[stretch][:, None]), "local-cubic", _ACCELERATION_HALF_WIDTH
+            )
+            rate = _native.velocity(times, np.ascontiguousarray(speed), "local-cubic", _ACCELERATION_HALF_WIDTH)
+            found.append(rate[_ACCELERATION_HALF_WIDTH:-_ACCELERATION_HALF_WIDTH, 0])
     return np.concatenate(found) if found else np.zeros(1)

@@ -25,7 +25,7 @@ PHASES, SINES = 2, 2
 #: Number of design variables per joint of a reference motion: pose, and amplitude and frequency of every oscillation, in both phases.
 PER_JOINT = PHASES * (1 + 2 * SINES)
 #: Time at rest at either end of a reference motion, s.
-_REST = 0.2
+_REST_TIME_S = 0.2
 #: Shortest duration of a move between two poses of a reference motion, s.
 SHORTEST_MOVE = 0.2
 #: Largest speed and acceleration of a fifth-order move over a unit distance in unit time (Siciliano 2009).
@@ -124,14 +124,14 @@ def build(numbers: Array, home: Array, limits: MotionLimits, duration: float, pe
     share = 0.2 + 0.6 * float(numbers[0])
     table = numbers[1:].reshape(n, PHASES, 1 + 2 * SINES).transpose(1, 0, 2)
     centres = low + table[:, :, 0] * (high - low)
-    available = duration - 2 * _REST
+    available = duration - 2 * _REST_TIME_S
     moves = _moves(home, centres, limits)
     while sum(moves) > 0.5 * available and np.max(np.abs(centres - home)) > 1e-6:
         centres = home + 0.8 * (centres - home)
         moves = _moves(home, centres, limits)
     left = available - sum(moves)
     lengths = (share * left, (1 - share) * left)
-    instants = _REST + np.cumsum([0.0, moves[0], lengths[0], moves[1], lengths[1], moves[2]])
+    instants = _REST_TIME_S + np.cumsum([0.0, moves[0], lengths[0], moves[1], lengths[1], moves[2]])
     lowest = np.array([[1.0 / length] for length in lengths])[:, :, None]
     frequency = lowest * (highest_frequency(limits, period)[None, :, None] / lowest) ** table[:, :, 2::2]
     frequency = np.maximum(frequency, lowest)

@@ -20,11 +20,11 @@ HELD_CERTAIN = 1.0
 #: Change of a parameter of the arm towards its prior, in standard deviations, from which a diagnosis names an effect without a gap.
 TRUST_SIGMAS = 4.0
 #: Standard deviations of evidence above a decision's threshold from which more evidence does not count in the search.
-_ENOUGH = 3.0
+_SUFFICIENT_SIGMAS = 3.0
 #: Evidence that the search for a motion aims at, as a multiple of sufficient evidence, as an effect may be smaller than assumed.
 AIM = 100.0
 #: Constant `G` of a motion's merit ``log(1 + G x)/log(1 + G)`` for evidence `x`, 0 to 1: the smaller, the more the weakest condition counts.
-_GROWTH = 1e4
+_MERIT_CONSTANT = 1e4
 
 
 class Outcome(NamedTuple):
@@ -75,11 +75,11 @@ class Outcome(NamedTuple):
         enough = _enough(threshold)
         parts = (
             self.fitted / (AIM * enough),
-            self.above / (AIM * (1.0 + _ENOUGH * self.spread)),
-            self.certain / (CERTAIN + _ENOUGH),
+            self.above / (AIM * (1.0 + _SUFFICIENT_SIGMAS * self.spread)),
+            self.certain / (CERTAIN + _SUFFICIENT_SIGMAS),
         )
         least = np.clip(np.min(parts, axis=0), 0.0, 1.0)
-        return float(self.weight @ (np.log1p(_GROWTH * least) / math.log1p(_GROWTH)))
+        return float(self.weight @ (np.log1p(_MERIT_CONSTANT * least) / math.log1p(_MERIT_CONSTANT)))
 
     @property
     def kept(self) -> float:
@@ -106,6 +106,6 @@ def certainty(advantage: Array, share: float) -> float:
 
 
 def _enough(threshold: float) -> float:
-    """Return the expected log-likelihood ratio that lies `_ENOUGH` of its standard deviations above a threshold."""
-    half = _ENOUGH / math.sqrt(2.0)
+    """Return the expected log-likelihood ratio that lies `_SUFFICIENT_SIGMAS` of its standard deviations above a threshold."""
+    half = _SUFFICIENT_SIGMAS / math.sqrt(2.0)
     return (half + math.sqrt(half * half + threshold)) ** 2

@@ -27,9 +27,9 @@ Array = NDArray[np.float64]
 #: Number of motions in a generation of differential evolution, and number of generations after the first.
 POPULATION, GENERATIONS = 16, 9
 #: Largest number of windows on which motions are compared, and number of best motions that are compared again on all windows.
-_WINDOWS, FINALISTS = 20, 4
+_MAX_COMPARED_WINDOWS, FINALISTS = 20, 4
 #: Largest number of steps in which a motion is scaled down until its torques are within limits and it is free of collision.
-_SHRINKS = 12
+_MAX_SCALING_STEPS = 12
 #: Factor per step by which a motion with a collision is scaled down.
 _SHRINK = 0.8
 #: Interval, in prediction steps, at which torques are checked while a motion is scaled down.
@@ -40,7 +40,7 @@ _POSES_PER_JOINT, LEFT = 5, 0.1
 COUPLED = 0.6
 #: Usual motions with which a search begins, and pairs of poses at which they oscillate, from 0 to 1 of each joint's range.
 _SEEDS = ("slow, then fast", "large travel", "fast multisine", "slow reversals")
-_POSES = ((0.5, 0.5), (0.3, 0.7), (0.8, 0.35))
+_POSE_PAIRS = ((0.5, 0.5), (0.3, 0.7), (0.8, 0.35))
 
 
 @dataclass(frozen=True)
@@ -130,7 +130,7 @@ class Search:
 
     def _allowed(self, motion: Motion, effects: Sequence[Any], part: float) -> Motion:
         """Scale a motion down until its torques are within a part of the limit and the arm is free of collision."""
-        for _ in range(_SHRINKS):
+        for _ in range(_MAX_SCALING_STEPS):
             within = self._within(motion, effects, part)
             motion = self._clear(within)
             if motion is within:
@@ -143,7 +143,7 @@ class Search:
         if space is None:
             return motion
         t = np.linspace(0.0, motion.duration, math.ceil(motion.duration * LOOK_HZ) + 1)
-        for _ in range(_SHRINKS):
+        for _ in range(_MAX_SCALING_STEPS):
             if space.is_free(motion.at(t)[0]):
                 return motion
             motion = motion.scaled(_SHRINK)
@@ -156,7 +156,7 @@ class Search:
             return motion
         h = self._setting.step * COARSE
         t = np.arange(0.0, motion.duration, h)
-        for _ in range(_SHRINKS):
+        for _ in range(_MAX_SCALING_STEPS):
             states = motion.at(t)
             tau = inverse_dynamics(self._setting.model, *states)
             if effects:
@@ -187,7 +187,7 @@ class Search:
 
         def cost(numbers: Array) -> float:
             motion = self.motion(numbers)
-            played = PredictedMotion(self._setting, motion, _WINDOWS)
+            played = PredictedMotion(self._setting, motion, _MAX_COMPARED_WINDOWS)
             outcomes = [played.outcome(p.quick, steps=0) for p in tested]
             state.count += 1
             state.most = np.maximum(state.most, [x.expected for x in outcomes])
@@ -215,7 +215,7 @@ class Search:
         """Return the initial population: usual motions at several poses, and random ones."""
         n = self._setting.arm.n_joints
         rng = np.random.default_rng([seed, 1])
-        usual = [named(name, n, poses) for poses in _POSES for name in _SEEDS]
+        usual = [named(name, n, poses) for poses in _POSE_PAIRS for name in _SEEDS]
         jitter = [np.clip(x + 0.05 * rng.standard_normal(len(x)), 0.0, 1.0) for x in usual]
         random = [rng.uniform(0.0, 1.0, count(n)) for _ in range(POPULATION - len(jitter))]
         return np.array([*jitter, *random])

@@ -21,7 +21,7 @@ __all__ = ["Carried", "Located", "locate", "resolve"]
 Array = NDArray[np.float64]
 
 #: Largest number of joints or links that an error message lists.
-_LISTED = 12
+_LISTED_LINKS = 12
 # Largest distance between placements that count as equal [m]: what rounding of a description's numbers leaves.
 _SAME_PLACE = 1e-6
 _MOST_FOLLOWED = 16
@@ -442,8 +442,8 @@ def _close(one: Array, other: Array) -> bool:
 
 def _few(words: Iterable[str]) -> list[str]:
     listed = list(words)
-    more = len(listed) - _LISTED
-    return listed if more <= 0 else [*listed[:_LISTED], f"and {more} more"]
+    more = len(listed) - _LISTED_LINKS
+    return listed if more <= 0 else [*listed[:_LISTED_LINKS], f"and {more} more"]
 
 
 def _joints(names: tuple[str, ...]) -> str:

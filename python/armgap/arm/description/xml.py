@@ -12,7 +12,7 @@ from armgap.files.reading import read_bounded
 
 __all__ = ["Element", "parse", "read_text"]
 
-_MOST_BYTES = 64 * 2**20
+_MAX_DESCRIPTION_BYTES = 64 * 2**20
 """Largest accepted size of a description's file, bytes: tens of times the size of descriptions that contain collision shapes."""
 
 
@@ -46,7 +46,7 @@ def read_text(path: Path) -> bytes:
         If the file cannot be read.
     """
     try:
-        return read_bounded(path, _MOST_BYTES)
+        return read_bounded(path, _MAX_DESCRIPTION_BYTES)
     except OSError as error:
         reason = error.strerror or str(error)
         raise ModelFileError(

@@ -31,7 +31,7 @@ _KINDS: dict[str, JointKind] = {**{kind: kind for kind in get_args(JointKind)}, 
 _MOST_JOINTS = 64
 # Largest deviation of a rotation matrix in an arm file from an orthonormal matrix; a matrix within it, from few digits, is orthonormalised.
 _ROTATION = 1e-3
-_EXACT = 1e-12
+_ORTHONORMAL_ROUNDING = 1e-12
 
 
 class LinkTables:
@@ -136,7 +136,7 @@ class LinkTables:
         off = float(np.max(np.abs(rotation @ rotation.T - np.eye(3))))
         if off > _ROTATION or np.linalg.det(rotation) < 0:
             raise self._error(f"{key}.rotation", "is no rotation", "give three rows at right angles, or rpy")
-        if off > _EXACT:
+        if off > _ORTHONORMAL_ROUNDING:
             u, _, vt = np.linalg.svd(rotation)
             rotation = u @ vt
         return rotation, translation

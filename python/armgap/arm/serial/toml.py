@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 # Largest rounding error of a link's ten inertial parameters, relative to the largest of them, at which mass, centre of mass and inertia about
 # the centre of mass are written in their place.
-_SAME = 1e-15
+_INERTIAL_ROUNDING = 1e-15
 _PER_JOINT = (
     ("position_min", "lower"),
     ("position_max", "upper"),
@@ -83,7 +83,10 @@ def _inertial_lines(ten: Array) -> list[str]:
         return []
     if ten[0] > 0:
         mass, com, inertia = about_com(ten)
-        for given, same in (((_neat(mass), _neat(com), _neat(inertia)), 0.0), ((mass, com, inertia), _SAME)):
+        for given, same in (
+            ((_neat(mass), _neat(com), _neat(inertia)), 0.0),
+            ((mass, com, inertia), _INERTIAL_ROUNDING),
+        ):
             mass, com, inertia = float(given[0]), given[1], given[2]
             if np.max(np.abs(about_origin(mass, com, inertia) - ten)) <= same * np.max(np.abs(ten)):
                 six = inertia[_ROWS, _COLUMNS]

@@ -18,11 +18,11 @@ from armgap.log.log import Log
 __all__ = ["copied_holdout"]
 
 # Number of equal rows at one distance in time from which rows count as copied; two runs of one experiment agree to the last digit less often.
-_FEWEST = 40
+_MIN_COPIED_ROWS = 40
 # Distances in time that differ by less than this part of a sample period count as one.
-_APART = 0.5
+_TIME_BIN_PERIODS = 0.5
 # Largest hole [rows] in a copied range of rows that is filled: rows that occur twice in a log are not compared.
-_HOLE = 50
+_MAX_FILLED_ROWS = 50
 
 
 def copied_holdout(training: Sequence[Log], holdout: Sequence[Log]) -> list[Check]:
@@ -75,20 +75,20 @@ def _common(
 ) -> NDArray[np.intp]:
     """Return the rows of the holdout log that also stand in the training log, at one distance in time."""
     _, here, there = np.intersect1d(its_rows[0], theirs[0], assume_unique=True, return_indices=True)
-    if len(here) < _FEWEST:
+    if len(here) < _MIN_COPIED_ROWS:
         return np.arange(0)
     mine, its = its_rows[1][here], theirs[1][there]
-    apart = np.round((held.t[mine] - log.t[its]) / (_APART * held.sample_period))
+    apart = np.round((held.t[mine] - log.t[its]) / (_TIME_BIN_PERIODS * held.sample_period))
     distances, counts = np.unique(apart, return_counts=True)
     best = distances[np.argmax(counts)]
     same = np.abs(apart - best) <= 1
-    if np.count_nonzero(same) < _FEWEST:
+    if np.count_nonzero(same) < _MIN_COPIED_ROWS:
         return np.arange(0)
     return _filled(np.sort(mine[same]))
 
 
 def _filled(rows: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return sorted row indices with the holes of up to `_HOLE` rows between them filled."""
-    ends = np.flatnonzero(np.diff(rows) > _HOLE)
+    """Return sorted row indices with the holes of up to `_MAX_FILLED_ROWS` rows between them filled."""
+    ends = np.flatnonzero(np.diff(rows) > _MAX_FILLED_ROWS)
     parts = zip(rows[np.r_[0, ends + 1]], rows[np.r_[ends, len(rows) - 1]], strict=True)
     return np.concatenate([np.arange(a, b + 1) for a, b in parts])

@@ -38,13 +38,13 @@ _WHITE_COUNTS = 1.0
 # A joint counts as moving where its travel per row exceeds this part of its usual fast travel per row.
 _MOVES = 0.05
 # Share of the rows in motion with held positions from which the defect is `repeated`, not a filter.
-_HELD = 0.1
+_MAX_HELD_SHARE = 0.1
 # Rows in motion that the check of filtered positions needs, and reversals that an exact log has to pass smoothly.
-_FEWEST, _REVERSALS = 200, 4
+_MIN_MOVING_ROWS, _REVERSALS = 200, 4
 # Largest noise of positions that count as exact, in rounding errors, and factor on that noise for fourth differences that count as zero.
-_EXACT, _FOURTH = 20.0, 8.0
+_EXACT_NOISE_ROUNDINGS, _FOURTH = 20.0, 8.0
 # Deviation from a sample period, as a part of it, within which rows count as evenly spaced, so that differences are meaningful.
-_EVEN = 0.2
+_EVEN_SPACING_TOLERANCE = 0.2
 # Share of fourth differences that are zero between an interpolation's knots, ratio of the other differences to the rounding, and steps of a
 # grid of positions that rounding to the grid makes more often than zero.
 _PIECEWISE, _KNOTS, _FEW_COUNTS = 0.05, 1e3, 5
@@ -53,7 +53,7 @@ _PIECEWISE, _KNOTS, _FEW_COUNTS = 0.05, 1e3, 5
 _ANY_SIZE, _FEWEST_KNOTS = 20.0, 20
 # Share of a position's high frequencies that torques, with a positive inertia, have to explain to count as motion. A controller's
 # torques follow the encoder's noise, filtered or not, by about half.
-_EXPLAINED = 0.9
+_MIN_EXPLAINED_SHARE = 0.9
 _HALF = 6
 _DOUBLE = float(np.finfo(np.float64).eps)
 
@@ -83,19 +83,21 @@ def _why(log: Log, j: int, step: float | None, dry: bool) -> str:
     slowest = max(_MOVES * usual, _WHITE_COUNTS * max(step or 0.0, grid or 0.0))
     moving = [p > slowest for p in paces]
     count = sum(int(np.count_nonzero(m)) for m in moving)
-    if count < _FEWEST or _stale(pieces, moving) > _HELD * count:
+    if count < _MIN_MOVING_ROWS or _stale(pieces, moving) > _MAX_HELD_SHARE * count:
         return ""
     even = [m & _even(log.t[r], log.sample_period) for r, m in zip(rows, moving, strict=True)]
-    spaced = sum(int(np.count_nonzero(m)) for m in even) >= _FEWEST
+    spaced = sum(int(np.count_nonzero(m)) for m in even) >= _MIN_MOVING_ROWS
     least = _over_times(log, j, rows, moving)
     if spaced:
         squares, middle = noise_by_order(pieces, even)
-        exact = _EXACT * max(rounding(q) for q in pieces)
+        exact = _EXACT_NOISE_ROUNDINGS * max(rounding(q) for q in pieces)
         if why := _unmeasured(pieces, even, exact, grid or 0.0):
             return why
         if middle[-1] <= exact:
             smooth = (
-                dry and squares[-1] <= _EXACT * _DOUBLE * _largest(pieces) and _reversals(pieces, even) >= _REVERSALS
+                dry
+                and squares[-1] <= _EXACT_NOISE_ROUNDINGS * _DOUBLE * _largest(pieces)
+                and _reversals(pieces, even) >= _REVERSALS
             )
             return "is smooth to its last digit, reversals included: filtered, fitted or computed" if smooth else ""
         least = min(least, float(squares.min()))
@@ -116,7 +118,7 @@ def _why(log: Log, j: int, step: float | None, dry: bool) -> str:
 
 def _even(t: Array, period: float) -> NDArray[np.bool_]:
     """Return a mask of the rows from which the steps in time, over six rows to either side, are equal to the sample period `period` [s]."""
-    off = np.append(0, np.cumsum(np.abs(np.diff(t) / period - 1) > _EVEN))
+    off = np.append(0, np.cumsum(np.abs(np.diff(t) / period - 1) > _EVEN_SPACING_TOLERANCE))
     rows = np.arange(len(t))
     return np.asarray(off[np.minimum(rows + _HALF, len(t) - 1)] == off[np.maximum(rows - _HALF, 0)])
 
@@ -180,4 +182,4 @@ def _driven(log: Log, j: int, rows: list[slice], moving: list[NDArray[np.bool_]]
         return False
     inverse_inertia = np.linalg.lstsq(x, y, rcond=None)[0]
     left = y - x @ inverse_inertia
-    return bool(inverse_inertia[j] > 0) and float(left @ left) < (1 - _EXPLAINED) * total
+    return bool(inverse_inertia[j] > 0) and float(left @ left) < (1 - _MIN_EXPLAINED_SHARE) * total

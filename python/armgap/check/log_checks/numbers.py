@@ -15,11 +15,11 @@ Array = NDArray[np.float64]
 _BLOCKS, _BLOCK_ROWS = 16, 4096
 
 # Values lie on a grid if at least this share (second number) of their differences lies so close (first number, in steps) to whole steps.
-_CLOSE, _MOST = 0.1, 0.97
+_GRID_TOLERANCE, _ON_GRID_SHARE = 0.1, 0.97
 # Smallest number of distinct values from which the step of a grid is determined.
 _FEWEST_LEVELS = 6
 # Values closer to each other than this part of the largest count as one value.
-_SAME = 1e-12
+_EQUAL_VALUE_TOLERANCE = 1e-12
 
 ORDERS = (4, 6, 8, 10, 12)
 """Orders of the differences that measure noise: motion fades with the order, white noise stays."""
@@ -45,7 +45,7 @@ def grid_step(values: Array) -> float | None:
     """
     levels = np.unique(values)
     gaps = np.diff(levels)
-    gaps = gaps[gaps > _SAME * max(float(np.abs(levels[[0, -1]]).max()), 1e-300)]
+    gaps = gaps[gaps > _EQUAL_VALUE_TOLERANCE * max(float(np.abs(levels[[0, -1]]).max()), 1e-300)]
     if len(gaps) < _FEWEST_LEVELS - 1:
         return None
     step = float(gaps.min())
@@ -53,7 +53,7 @@ def grid_step(values: Array) -> float | None:
         near = gaps < (most + 0.5) * step
         step = float(np.sum(gaps[near]) / np.sum(np.round(gaps[near] / step)))
     off = np.abs(gaps / step - np.round(gaps / step))
-    return step if float(np.mean(off < _CLOSE)) > _MOST else None
+    return step if float(np.mean(off < _GRID_TOLERANCE)) > _ON_GRID_SHARE else None
 
 
 def rounding(q: Array) -> float:

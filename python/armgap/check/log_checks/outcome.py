@@ -15,7 +15,7 @@ from armgap.log.log import Log
 __all__ = ["NOTHING", "Outcome", "ranges", "seconds", "with_rows"]
 
 # Largest number of row ranges that a check lists.
-_LISTED = 200
+_LISTED_RANGES = 200
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ def ranges(rows: NDArray[np.intp] | Sequence[int]) -> tuple[tuple[int, int], ...
         return ()
     ends = np.flatnonzero(np.diff(rows) > 1)
     first, last = rows[np.r_[0, ends + 1]], rows[np.r_[ends, len(rows) - 1]]
-    return tuple((int(a), int(b)) for a, b in zip(first[:_LISTED], last[:_LISTED], strict=True))
+    return tuple((int(a), int(b)) for a, b in zip(first[:_LISTED_RANGES], last[:_LISTED_RANGES], strict=True))
 
 
 def seconds(time: float) -> str:

@@ -21,12 +21,12 @@ Array = NDArray[np.float64]
 # Rounding error as a part of the torque's RMS variation from which quantisation is reported: as large as many an effect.
 _MATTERS = 0.015
 # Number of levels below which a torque counts as a command with levels by design, not as quantised.
-_LEVELS = 8
+_MIN_QUANTIZED_LEVELS = 8
 # Changes of a torque's level that the check of quantisation needs.
 _CHANGES = 40
 # A torque counts as rounded if its median stay at a level is below so many rows, or if more than this share of its changes are of one step and
 # the standard deviation of the stays exceeds this part of their mean.
-_STAYS, _ONE_STEP, _EQUALLY_LONG = 5, 0.5, 0.2
+_MEDIAN_STAY_ROWS, _ONE_STEP, _EQUALLY_LONG = 5, 0.5, 0.2
 
 
 def look(log: Log, arm: Arm | None) -> Outcome:
@@ -48,14 +48,14 @@ def look(log: Log, arm: Arm | None) -> Outcome:
 
 def _rounded(tau: Array, step: float) -> bool:
     """Whether a torque passes through its levels as a rounded continuous signal does."""
-    if len(np.unique(np.round(tau / step))) < _LEVELS:
+    if len(np.unique(np.round(tau / step))) < _MIN_QUANTIZED_LEVELS:
         return False
     moved = np.diff(tau)
     at = np.flatnonzero(np.abs(moved) > 0.5 * step)
     if len(at) < _CHANGES:
         return False
     stays = np.diff(at)
-    if float(np.median(stays)) < _STAYS:
+    if float(np.median(stays)) < _MEDIAN_STAY_ROWS:
         return True
     single = float(np.mean(np.abs(moved[at]) < 1.5 * step))
     return single > _ONE_STEP and float(np.std(stays) / np.mean(stays)) > _EQUALLY_LONG

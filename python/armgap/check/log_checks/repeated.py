@@ -29,9 +29,9 @@ _SLOW_COUNTS = 2.0
 # Range of the position's step after a hold, relative to the travel of the motion over the rows of the hold.
 _MAKES_UP = (0.5, 2.0)
 # Share of the rows in motion with held positions, and number of these rows, from which a hold is reported.
-_SHARE, _FEWEST = 0.1, 20
+_SHARE, _MIN_HELD_ROWS = 0.1, 20
 # Rows to either side over which motion is judged at least (else twice the usual hold), and rows of the longest hold.
-_AROUND, _LONGEST = 8, 64
+_AROUND, _MAX_HOLD_ROWS = 8, 64
 # Share of held rows in common from which two joints are held together.
 _AGREE = 0.9
 # Share of holds of equal length from which a joint's held positions have a regular pattern.
@@ -92,7 +92,7 @@ def _held(q: Array) -> _Held:
     runs = np.concatenate(lengths)
     length = float(np.median(runs)) if len(runs) else 1.0
     pace = travel_per_row(q, _reach(length))
-    share = held / max(moving, 1) if held >= _FEWEST else 0.0
+    share = held / max(moving, 1) if held >= _MIN_HELD_ROWS else 0.0
     return _Held(again, pace > _FAST_COUNTS * step, pace > _SLOW_COUNTS * step, share, length)
 
 
@@ -109,9 +109,9 @@ def _holds(q: Array, step: float) -> tuple[int, int, Array]:
     steps = q[starts[1:]] - q[starts[:-1]]
     into, out = steps[:-2], steps[1:-1]
     first = starts[1:-2]
-    reach = _reach(min(float(np.median(length[length > 1])) if np.any(length > 1) else 1.0, _LONGEST))
+    reach = _reach(min(float(np.median(length[length > 1])) if np.any(length > 1) else 1.0, _MAX_HOLD_ROWS))
     pace = travel_per_row(q, reach)[first]
-    fast = (pace > _FAST_COUNTS * step) & (length <= _LONGEST)
+    fast = (pace > _FAST_COUNTS * step) & (length <= _MAX_HOLD_ROWS)
     asked = length * pace
     makes_up = (into * out > 0) & (np.abs(out) > _MAKES_UP[0] * asked) & (np.abs(out) < _MAKES_UP[1] * asked)
     held = fast & makes_up & (length > 1)
@@ -121,7 +121,7 @@ def _holds(q: Array, step: float) -> tuple[int, int, Array]:
 def _agree(held: _Held, other: _Held) -> bool:
     """Whether the position columns of two joints repeat their last value in the same rows, among the rows in which both joints move."""
     both = held.fast & other.fast
-    if np.count_nonzero(both) < _FEWEST:
+    if np.count_nonzero(both) < _MIN_HELD_ROWS:
         return True
     # The smaller count of the two joints: a joint that stops at times repeats its position without being held.
     one, two = np.count_nonzero(held.again & both), np.count_nonzero(other.again & both)
@@ -145,7 +145,7 @@ def _fresh(log: Log, held: list[_Held]) -> NDArray[np.intp]:
 def _beat(held: list[_Held]) -> tuple[int, int] | None:
     """Return period and phase [rows] at which new positions follow a regular hold; None for an irregular hold."""
     fresh = np.unique(np.concatenate([np.flatnonzero(~h.again & h.fast) for h in held]))
-    if len(fresh) < _FEWEST:
+    if len(fresh) < _MIN_HELD_ROWS:
         return None
     period = int(np.median(np.diff(fresh)))
     if period < 2:

@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
 
 # Longest run of spike rows; the longest that leaves prediction windows whole.
-_LONGEST = 3
+_MAX_SPIKE_ROWS = 3
 # Distance of a spike from the line through its neighbours, in units of the travel per row around it. A blow reverses a joint within a row: up to 2.
 _TIMES_MOTION = 3.0
 # Distance of a spike from the line through its neighbours, in units of the change of travel per row that is exceeded in 5 % of the rows.
@@ -31,9 +31,9 @@ _TIMES_USUAL = 20.0
 # Distance of a spike at an end of a log, where neighbours are on one side only, in units of the usual change of travel per row.
 _TIMES_AT_END = 10.0
 # Share of rows of a log up to which rows with deviating positions or torques count as spikes.
-_MOST = 0.005
+_MAX_SPIKE_SHARE = 0.005
 # Ratio to the torque exceeded in 0.5 % of the rows from which a torque is a candidate, and from which it is absurd whatever the arm does.
-_TORQUE_FACTOR, _TORQUE_ABSURD = 30.0, 1e3
+_SPIKE_TORQUE_RATIO, _TORQUE_ABSURD = 30.0, 1e3
 # Share of rows with non-zero torque below which a torque has no usual size.
 _TORQUE_ACTIVE = 0.05
 # Rows that each part of a log needs for the log to be split in two.
@@ -43,12 +43,12 @@ _SPEED_ROWS = 5
 # Length left out around a torque spike [s; periods]: predictions end where samples are missing for 10 periods and a quarter of the usual horizon.
 _BREAK, _BREAK_PERIODS = 0.07, 12
 # Largest number of rows from which scales of travel and torque are computed.
-_ENOUGH = 200_000
+_MAX_SCALE_ROWS = 200_000
 
 
 def look(log: Log, arm: Arm | None) -> Outcome:
     """Leave out rows with spikes of position, and rows around a spike of torque."""
-    if len(log) < 4 * _LONGEST + 4:
+    if len(log) < 4 * _MAX_SPIKE_ROWS + 4:
         return NOTHING
     found = []
     wild = np.zeros(len(log), dtype=bool)
@@ -60,7 +60,7 @@ def look(log: Log, arm: Arm | None) -> Outcome:
             tau = np.ascontiguousarray(log.tau[:, j])
             columns.append((f"tau{j + 1}", tau, _torques(log.t, q, tau)))
         for name, values, rows in columns:
-            if not len(rows) or len(rows) > max(_LONGEST, _MOST * len(log)):
+            if not len(rows) or len(rows) > max(_MAX_SPIKE_ROWS, _MAX_SPIKE_SHARE * len(log)):
                 continue
             wild[rows] = True
             if name[0] != "q":
@@ -90,13 +90,13 @@ def _said(log: Log, name: str, values: Array, rows: Rows, j: int) -> Check:
 def _positions(q: Array) -> Rows:
     steps = np.diff(q)
     bends = np.abs(np.diff(steps))
-    thin = bends[:: max(1, len(bends) // _ENOUGH)]
+    thin = bends[:: max(1, len(bends) // _MAX_SCALE_ROWS)]
     floor = _TIMES_USUAL * float(np.quantile(thin, 0.95)) + 1e-9 * float(np.median(np.abs(q)))
     steps = np.abs(steps)
     wild: list[Rows] = [_at_start(q, floor), len(q) - 1 - _at_start(q[::-1], floor)]
     # A spike that begins at row k makes a second difference of about its size at row k - 1, which is entry k - 2 of `bends`.
     first = np.flatnonzero(bends > floor / 4) + 2
-    for m in range(1, _LONGEST + 1):
+    for m in range(1, _MAX_SPIKE_ROWS + 1):
         k = first[(first >= 3) & (first < len(q) - m - 2)]
         if not len(k):
             continue
@@ -115,7 +115,7 @@ def _line(q: Array, k: Rows, m: int, i: int) -> Array:
 
 def _at_start(q: Array, floor: float) -> Rows:
     """Return the first one to three rows if they lie far off the straight line through the rows after them; else no row."""
-    for m in range(_LONGEST, 0, -1):
+    for m in range(_MAX_SPIKE_ROWS, 0, -1):
         around = float(np.max(np.abs(np.diff(q[m : m + 4]))))
         pace = q[m + 1] - q[m]
         off = np.abs(q[:m] - (q[m] - pace * np.arange(m, 0, -1)))
@@ -126,13 +126,13 @@ def _at_start(q: Array, floor: float) -> Rows:
 
 def _torques(t: Array, q: Array, tau: Array) -> Rows:
     size = np.abs(tau)
-    thin = size[:: max(1, len(size) // _ENOUGH)]
+    thin = size[:: max(1, len(size) // _MAX_SCALE_ROWS)]
     usual = float(np.quantile(thin, 0.995))
     if usual == 0 or float(np.mean(thin > 0)) < _TORQUE_ACTIVE:
         return np.arange(0)
     wild: list[int] = []
-    for first, last in ranges(np.flatnonzero(size > _TORQUE_FACTOR * usual)):
-        if last - first >= _LONGEST:
+    for first, last in ranges(np.flatnonzero(size > _SPIKE_TORQUE_RATIO * usual)):
+        if last - first >= _MAX_SPIKE_ROWS:
             continue
         absurd = float(size[first : last + 1].min()) > _TORQUE_ABSURD * usual
         if absurd or not _answered(t, q, first, last):
@@ -145,7 +145,7 @@ def _answered(t: Array, q: Array, first: int, last: int) -> bool:
     w = _SPEED_ROWS
     if first < w or last + 1 + w >= len(q):
         return False
-    thin = slice(0, min(len(q), _ENOUGH))
+    thin = slice(0, min(len(q), _MAX_SCALE_ROWS))
     speed = (q[thin][w:] - q[thin][:-w]) / (t[thin][w:] - t[thin][:-w])
     apart = w + 1 + last - first
     usual = float(np.quantile(np.abs(speed[apart:] - speed[:-apart]), 0.99))

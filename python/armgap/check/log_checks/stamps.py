@@ -24,19 +24,19 @@ __all__ = ["look"]
 Array = NDArray[np.float64]
 
 # Scatter of time stamps, in sample periods, below which they count as even.
-_EVEN = 0.01
+_EVEN_STAMP_SCATTER = 0.01
 # Even times are better if they leave less than the first part of the stamps' error variance on some joint, and on no joint more than the second
 # number times it, in the share of rows (third number) where jitter shows most.
-_BETTER, _WORSE, _LOUD = 0.5, 1.2, 0.2
+_BETTER_VARIANCE_RATIO, _WORSE_VARIANCE_RATIO, _LOUD = 0.5, 1.2, 0.2
 # Largest regression coefficient of position errors over even times on the errors that right stamps would make: 1 where stamps are right, 0 where
 # even times are right.
 _SHOWN = 0.15
 # Rows that the comparison of stamps and even times needs.
-_FEWEST = 100
+_MIN_COMPARED_ROWS = 100
 # Step between stamps, in periods, that may hide a missing row; a row is missing if the later stamps are late by this part of a period.
 _LONG, _LATE = 1.3, 0.6
 # Iterations of the search for missing rows, each with a new line through the stamps.
-_ROUNDS = 12
+_MISSING_ROW_ITERATIONS = 12
 # Rows to either side of a long step whose mean lateness is compared.
 _BESIDE = 12
 # Largest distance of even times from the stamps' mean over so many rows, in periods; a clock's drift is slower.
@@ -47,12 +47,12 @@ _DRIFT_ROWS, _DRIFT_STANDS_OUT = 128, 4.0
 
 def look(log: Log, arm: Arm | None) -> Outcome:
     """Replace time stamps by even times if the positions fit even times better."""
-    if len(log) < 2 * _FEWEST:
+    if len(log) < 2 * _MIN_COMPARED_ROWS:
         return NOTHING
     period = log.sample_period
     steps = np.diff(log.t)
     # Steps by whole periods, where rows may be missing, count as even.
-    if float(np.mean(np.abs(steps / period - np.maximum(np.round(steps / period), 1)))) < _EVEN:
+    if float(np.mean(np.abs(steps / period - np.maximum(np.round(steps / period), 1)))) < _EVEN_STAMP_SCATTER:
         return NOTHING
     even = _even_times(log.t, steps, period)
     if even is None:
@@ -79,14 +79,14 @@ def _better(log: Log, even: Array) -> float | None:
     for j in range(log.n_joints):
         size = np.abs(shown[:, j])
         loud = (size >= np.quantile(size, 1 - _LOUD)) & (size > 0)
-        if np.count_nonzero(loud) < _FEWEST:
+        if np.count_nonzero(loud) < _MIN_COMPARED_ROWS:
             continue
         ratio = _middle(evenly[loud, j]) / max(_middle(stamped[loud, j]), 1e-300)
         trace = abs(float(evenly[loud, j] @ shown[loud, j])) / max(float(shown[loud, j] @ shown[loud, j]), 1e-300)
-        if ratio > _WORSE or (ratio < _BETTER and trace > _SHOWN):
+        if ratio > _WORSE_VARIANCE_RATIO or (ratio < _BETTER_VARIANCE_RATIO and trace > _SHOWN):
             return None
         ratios.append(ratio)
-    return float(1 / np.sqrt(min(ratios))) if ratios and min(ratios) < _BETTER else None
+    return float(1 / np.sqrt(min(ratios))) if ratios and min(ratios) < _BETTER_VARIANCE_RATIO else None
 
 
 def _misses(t: Array, even: Array, q: Array) -> tuple[Array, Array, Array]:
@@ -108,7 +108,7 @@ def _even_times(t: Array, steps: Array, period: float) -> Array | None:
     missing = _missing(t, steps, period)
     index = np.arange(len(t)) + np.append(0, np.cumsum(missing))
     start, period = _straight(index, t)
-    for _ in range(_ROUNDS):
+    for _ in range(_MISSING_ROW_ITERATIONS):
         settled = _settled(missing, t - start - period * index, steps, period)
         if np.array_equal(settled, missing):
             break

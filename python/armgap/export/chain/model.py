@@ -18,7 +18,7 @@ _TIME_STEP = 5e-4
 #: Decay rate by viscous friction, times the time step, up to which Runge-Kutta is used; the method is stable to 2.8 (Hairer 1993, section IV.2).
 _STABLE = 1.0
 #: Number of random poses at which the decay rate by viscous friction is computed.
-_POSES = 50
+_RANDOM_POSES = 50
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class SimulatorModel:
             return "implicitfast"
         n, rng = len(self.joints), np.random.default_rng(1)
         theta = np.concatenate([self.inertial.ravel(), [joint.armature for joint in self.joints], np.zeros(2 * n)])
-        inertia = self.chain.native().inertia(theta, rng.uniform(-np.pi, np.pi, (_POSES, n)))
+        inertia = self.chain.native().inertia(theta, rng.uniform(-np.pi, np.pi, (_RANDOM_POSES, n)))
         rates = np.linalg.solve(inertia, np.diag([joint.viscous for joint in self.joints]))
         return "RK4" if np.abs(np.linalg.eigvals(rates)).max() * self.time_step < _STABLE else "implicitfast"
 

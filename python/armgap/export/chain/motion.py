@@ -21,7 +21,7 @@ _STATES = 400
 #: Half width of the local cubics that give velocities and accelerations [s]: that of the test functions of the diagnosis.
 _HALF_WIDTH_S = 0.05
 #: Smallest number of samples of a local cubic.
-_FEWEST = 7
+_MIN_CUBIC_SAMPLES = 7
 #: Standard deviations of speed [rad/s or m/s] and acceleration [rad/s^2 or m/s^2] of random states.
 _SPEED, _ACCELERATION = 1.0, 3.0
 
@@ -38,13 +38,13 @@ def positions(diagnosis: Diagnosis, n: int) -> list[tuple[Array, Array]]:
 def diagnosed_states(diagnosis: Diagnosis, n: int) -> States | None:
     """Return states along the diagnosed holdout motion, from local cubics; None if the diagnosis holds no motion."""
     found: list[Array] = []
-    logs = [(t, q) for t, q in positions(diagnosis, n) if len(t) > 2 * _FEWEST]
+    logs = [(t, q) for t, q in positions(diagnosis, n) if len(t) > 2 * _MIN_CUBIC_SAMPLES]
     for t, q in logs:
         count = max(_STATES // len(logs), 1)
-        for k in np.linspace(_FEWEST, len(t) - 1 - _FEWEST, count).astype(int):
+        for k in np.linspace(_MIN_CUBIC_SAMPLES, len(t) - 1 - _MIN_CUBIC_SAMPLES, count).astype(int):
             near = np.flatnonzero(np.abs(t - t[k]) <= _HALF_WIDTH_S)
-            if len(near) < _FEWEST:
-                near = np.arange(k - _FEWEST // 2, k + _FEWEST // 2 + 1)
+            if len(near) < _MIN_CUBIC_SAMPLES:
+                near = np.arange(k - _MIN_CUBIC_SAMPLES // 2, k + _MIN_CUBIC_SAMPLES // 2 + 1)
             powers = (t[near] - t[k])[:, None] ** np.arange(4)
             cubic = np.linalg.lstsq(powers / np.abs(powers).max(axis=0), q[near], rcond=None)[0]
             cubic /= np.abs(powers).max(axis=0)[:, None]

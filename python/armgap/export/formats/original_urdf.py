@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 
 _DOWN = np.array([0.0, 0.0, -1.0])
 #: Difference of unit vectors of gravity below which the directions count as equal.
-_SAME = 1e-9
+_EQUAL_DIRECTION_TOLERANCE = 1e-9
 
 
 def write_urdf(
@@ -104,6 +104,6 @@ def _mounting(model: CorrectedSerial, located: Located) -> tuple[str, ...]:
     # The estimated tilt is written to the joints, so the remark states gravity without it.
     nominal = located.rotation @ (model.tilt @ model.chain.gravity)
     size = float(np.linalg.norm(nominal))
-    if size == 0 or np.max(np.abs(nominal / size - _DOWN)) < _SAME:
+    if size == 0 or np.max(np.abs(nominal / size - _DOWN)) < _EQUAL_DIRECTION_TOLERANCE:
         return (f"gravity is {size:g} m/s^2 along -z: set it in the simulator",)
     return (f"gravity in the frame of the root is {numbers(np.round(nominal, 6))} m/s^2: set it in the simulator",)

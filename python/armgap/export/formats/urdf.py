@@ -21,7 +21,7 @@ __all__ = ["assumed", "inertia_entries", "render"]
 Array = NDArray[np.float64]
 
 #: Limit written where URDF requires one and none is known: beyond any motion of an arm, m and m/s (rad/s).
-_FAR = 1e3
+_UNKNOWN_LIMIT = 1e3
 _DOWN = np.array([0.0, 0.0, -1.0])
 
 
@@ -73,7 +73,7 @@ def assumed(arm: SimulatorModel) -> list[str]:
     ]:
         lines.append(f"URDF has no rotor inertia: set as armature in the simulator, SI: {', '.join(rotors)}")
     if any(_limits(arm, j)[1] for j in range(len(arm.joints))):
-        lines.append(f"limits of position, speed or torque that are not known are set to {_FAR:g}")
+        lines.append(f"limits of position, speed or torque that are not known are set to {_UNKNOWN_LIMIT:g}")
     return lines
 
 
@@ -142,5 +142,5 @@ def _limits(arm: SimulatorModel, j: int) -> tuple[dict[str, float], bool]:
     found = {"effort": effort, "velocity": speed}
     if bounded:
         found |= {"lower": low + values.reading, "upper": high + values.reading}
-    known = {name: min(max(value, -_FAR), _FAR) for name, value in found.items()}
+    known = {name: min(max(value, -_UNKNOWN_LIMIT), _UNKNOWN_LIMIT) for name, value in found.items()}
     return known, known != found

@@ -33,7 +33,7 @@ OPTIONAL = {
 }
 """Optional groups of columns, used only if every joint has one, with the words for each group in messages."""
 #: Largest number of columns that an error message lists.
-_LISTED = 24
+_LISTED_COLUMNS = 24
 _TICKS_S = {"ns": 1e-9, "us": 1e-6, "ms": 1e-3}
 
 
@@ -349,7 +349,7 @@ def _pick(index: Index, names: Mapping[str, str], key: str, within: str | None) 
     found = index.find(source, key, within=within)
     if found is None:
         columns = index.recording.columns
-        available = ", ".join(columns[:_LISTED]) + (", ..." if len(columns) > _LISTED else "")
+        available = ", ".join(columns[:_LISTED_COLUMNS]) + (", ..." if len(columns) > _LISTED_COLUMNS else "")
         mapped = f"it is mapped to {key}, but" if key in names else "it"
         raise ColumnError(
             f"{mapped} is missing",

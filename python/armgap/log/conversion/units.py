@@ -42,11 +42,11 @@ _SPEED_SPAN_S = 0.02
 # Ratio of a differenced position to the velocity column that shows different units: 57.3 (degrees) or 1000 (mm), with a margin for noise.
 _DEGREE_RATIO = (40.0, 80.0)
 # Largest number of samples that determine the sample period, and whether positions change in whole encoder counts.
-_ENOUGH = 100_000
+_MAX_INSPECTED_SAMPLES = 100_000
 _SURE_RATIO = (52.0, 63.0)
 _MILLI_RATIO = (700.0, 1400.0)
 # Ratio of a commanded torque to the arm's limit above which the torque is in another unit.
-_TORQUE_FACTOR = 20.0
+_TORQUE_TO_LIMIT_RATIO = 20.0
 # Share of rows with an implausible magnitude up to which the rows count as defective, not as in another unit.
 _WILD_SHARE = 0.002
 
@@ -351,7 +351,7 @@ def _position(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None) 
 
 def _peak_speed(arrays: Arrays, arm: Arm | None, j: int) -> float:
     """Return the speed of joint `j` that is exceeded for 1 % of the log."""
-    stride = max(1, round(_SPEED_SPAN_S / float(np.median(np.diff(arrays.t[:_ENOUGH])))))
+    stride = max(1, round(_SPEED_SPAN_S / float(np.median(np.diff(arrays.t[:_MAX_INSPECTED_SAMPLES])))))
     t, q = arrays.t[::stride], _without_turns(arrays, arm, j)[::stride]
     return float(np.quantile(np.abs(np.diff(q) / np.diff(t)), 0.99)) if len(t) > 1 else 0.0
 
@@ -373,7 +373,7 @@ def _moves_in_counts(arrays: Arrays, arm: Arm | None, j: int, factor: float) -> 
     """Whether positions of joint `j` times `factor` change in whole encoder counts."""
     if arm is None or arm.encoder_step is None:
         return False
-    moved = np.diff(arrays.q[:_ENOUGH, j])
+    moved = np.diff(arrays.q[:_MAX_INSPECTED_SAMPLES, j])
     moved = moved[moved != 0]
     if len(moved) < 20:
         return False
@@ -389,7 +389,7 @@ def _torque(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None) ->
         wild = int(_WILD_SHARE * len(arrays.tau))
         peak = float(np.partition(np.abs(arrays.tau[:, j]), -1 - wild)[-1 - wild])
         limit = float(arm.torque_limit[j])
-        if peak > _TORQUE_FACTOR * limit:
+        if peak > _TORQUE_TO_LIMIT_RATIO * limit:
             si = "Nm" if arm.rotary_joints[j] else "N"
             raise UnitError(
                 f"reaches {peak:.4g}, {peak / limit:.3g} times the arm's torque limit of {limit:g}",

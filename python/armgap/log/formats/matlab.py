@@ -17,7 +17,7 @@ from armgap.log.recording import Recording, Source
 __all__ = ["FORMAT"]
 
 #: Largest number of levels of nested MATLAB structures that are read.
-_DEEPEST = 8
+_MAX_STRUCT_DEPTH = 8
 
 
 def read(source: Source) -> Recording:
@@ -59,7 +59,7 @@ def _walk(path: str, value: Any, depth: int) -> Iterator[tuple[str, NDArray[Any]
     if isinstance(value, np.ndarray) and value.dtype == object and value.size == 1:
         value = value.reshape(-1)[0]
     fields = getattr(value, "_fieldnames", None)
-    if fields is not None and depth < _DEEPEST:
+    if fields is not None and depth < _MAX_STRUCT_DEPTH:
         for name in fields:
             yield from _walk(f"{path}/{name}", getattr(value, name), depth + 1)
     elif isinstance(value, np.ndarray) and value.dtype.kind in "fiub":

@@ -23,7 +23,7 @@ from armgap.progress import report_progress
 __all__ = ["KINDS", "Message", "record"]
 
 _QUANTITIES = ("position", "velocity", "effort")
-_LOOK = 5000  # messages between two reports of progress
+_PROGRESS_MESSAGES = 5000  # messages between two reports of progress
 _TORQUE_WORDS = ("effort", "torque", "tau")
 # Rows of a message: time in ns (None without a stamp), names of columns, names of joints, values.
 Rows = list[tuple[int | None, tuple[str, ...], tuple[str, ...], list[float]]]
@@ -134,7 +134,7 @@ def record(messages: Iterable[Message], path: Path, seen: Mapping[str, str], cou
     topics: dict[tuple[str, tuple[str, ...]], _Topic] = {}
     empty: dict[str, int] = {}
     for number, message in enumerate(messages, start=1):
-        if count and number % _LOOK == 0:
+        if count and number % _PROGRESS_MESSAGES == 0:
             report_progress(f"reading {path.name}", min(number / count, 1.0))
         try:
             rows = KINDS[message.kind](message)

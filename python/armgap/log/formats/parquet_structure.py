@@ -23,7 +23,7 @@ __all__ = ["check"]
 
 _TAIL = 8  # bytes at the end of a file: length of the footer, and marker bytes
 _HEADER = 1 << 16  # largest size of a page header, bytes: usually tens of bytes, with statistics more
-_DEEPEST = 16
+_MAX_THRIFT_DEPTH = 16
 _MOST_ENTRIES = 1 << 22
 _DATA_PAGE, _DATA_PAGE_V2 = 0, 3
 # Field numbers of the Parquet metadata structures in parquet.thrift.
@@ -91,7 +91,7 @@ class _Thrift:
         return [(self.value(kinds >> 4, depth + 1), self.value(kinds & 15, depth + 1)) for _ in range(size)]
 
     def value(self, kind: int, depth: int) -> Any:
-        if depth > _DEEPEST:
+        if depth > _MAX_THRIFT_DEPTH:
             raise _BrokenError("is nested too deeply")
         if kind in (1, 2):
             return kind == 1

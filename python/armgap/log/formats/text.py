@@ -31,7 +31,7 @@ _COMMENTS = ("#", "%", "//")
 _COMMA = re.compile(r"(?:^|[;\s])[+-]?\d*,\d+(?:[eE][+-]?\d+)?(?:$|[;\s])")
 _POINT = re.compile(r"(?:^|[;\s])[+-]?\d*\.\d+(?:[eE][+-]?\d+)?(?:$|[;\s])")
 _BLOCK = 100_000  # lines that are parsed at once
-_LOOK = 10_000  # lines between two updates of the number of bytes read
+_PROGRESS_LINES = 10_000  # lines between two updates of the number of bytes read
 _SAMPLE = 1000  # lines by which decimal commas are recognised
 _MARKS = {codecs.BOM_UTF8: "utf-8-sig", codecs.BOM_UTF16_LE: "utf-16", codecs.BOM_UTF16_BE: "utf-16"}
 
@@ -67,7 +67,7 @@ class _Lines:
         stream = self.source.open()
         with io.TextIOWrapper(stream, encoding=self.encoding, errors="replace") as text:
             for number, raw in enumerate(text):
-                if number % _LOOK == 0:
+                if number % _PROGRESS_LINES == 0:
                     self.read = stream.tell()
                 line = raw.rstrip("\r\n")
                 bare = line.strip()

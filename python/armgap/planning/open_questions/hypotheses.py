@@ -24,7 +24,7 @@ Data = dict[str, Any]
 #: Change of predictions by an effect, in noise floors, from which the effect matters.
 SEVERAL = 3.0
 #: Ratio of the largest to the smallest size of an effect that is tried, upwards from the size that matters or downwards from a known bound.
-_REACH = 10.0
+_TRIED_SIZE_RATIO = 10.0
 #: Number of sizes of an effect that are tried.
 SIZES = 5
 #: Nodes and weights of the mean over a normal distribution (Gauss-Hermite, three points).
@@ -168,10 +168,12 @@ class HypothesisBuilder:
         effect = EffectInstance(*question.place, shape.at(shape.typical))
         floors = self._usual.floors(HypothesisPair(((1.0, (*without, effect)),), without), 0, self._floor)
         matters = shape.typical * (SEVERAL / floors if floors > 0 else 1.0)
-        matters = min(max(matters, shape.typical / 1e4), shape.typical * _REACH)
+        matters = min(max(matters, shape.typical / 1e4), shape.typical * _TRIED_SIZE_RATIO)
         if question.bound is None or shape.inverse:
-            return np.geomspace(matters, _REACH * matters, SIZES)
-        return np.geomspace(max(min(matters, question.bound), question.bound / _REACH), question.bound, SIZES)
+            return np.geomspace(matters, _TRIED_SIZE_RATIO * matters, SIZES)
+        return np.geomspace(
+            max(min(matters, question.bound), question.bound / _TRIED_SIZE_RATIO), question.bound, SIZES
+        )
 
     def _rival(self, question: Question, rough: HypothesisPair) -> EffectInstance:
         """Return the rival effect with the diagnosis' values, or with values that best imitate the effect over the usual motion."""

@@ -19,7 +19,7 @@ PART = 0.05
 #: Typical elastic joint: natural frequency of the motor on its spring [1/s], motor's part of the joint's inertia, damping ratio.
 SHAFT_RATE, MOTOR_SHARE, SHAFT_DAMPING = 100.0, 0.1, 0.2
 #: Number of values that are tried over the possible range of an effect that is a threshold, such as a saturation level.
-_STEPS = 5
+_THRESHOLD_VALUES = 5
 #: Stiffness of a contact, in typical torques per typical position, and its damping, in typical torques per typical speed.
 CONTACT_STIFFNESS, CONTACT_DAMPING = 30.0, 0.5
 
@@ -218,7 +218,7 @@ def levels(effect: str, joint: int | None, scales: Scales) -> list[dict[str, flo
     if effect == "torque_saturation":
         most = float(scales.most_torque[j])
         least = min(max(float(scales.seen_torque[j]), 0.1 * most), 0.9 * most)
-        return [{"level": float(x)} for x in np.geomspace(least, most, _STEPS + 2)[1:-1]]
+        return [{"level": float(x)} for x in np.geomspace(least, most, _THRESHOLD_VALUES + 2)[1:-1]]
     stiffness = CONTACT_STIFFNESS * float(scales.torque[j] / scales.position[j])
     damping = CONTACT_DAMPING * float(scales.torque[j] / scales.speed[j])
     # The side of a contact is the sign of its position.
@@ -228,7 +228,7 @@ def levels(effect: str, joint: int | None, scales: Scales) -> list[dict[str, flo
     )
     found = []
     for seen, end in ends:
-        parts = (np.arange(_STEPS) + 0.5) / _STEPS
+        parts = (np.arange(_THRESHOLD_VALUES) + 0.5) / _THRESHOLD_VALUES
         if (end - seen) * np.sign(end) > 0:
             found += [
                 {"position": seen + float(x) * (end - seen), "stiffness": stiffness, "damping": damping} for x in parts

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 __all__ = ["RerunMissingError", "models", "poses", "predicted", "write_replay"]
 
 #: Half width of the local cubic that gives initial velocities, in samples.
-_HALF_WIDTH = 8
+_INITIAL_VELOCITY_HALF_WIDTH = 8
 #: Distance between drawn arms, in reaches of the arm.
 APART = 2.4
 #: Thickness of a drawn link, as a part of the arm's reach.
@@ -62,7 +62,7 @@ def predicted(model: Hypothesis, log: Log, horizon: float) -> Array:
         remedy = f"give at least the sample period of {log.sample_period:g} s"
         raise OptionError(f"the horizon is {horizon:g} s", remedy=remedy)
     q, t = np.ascontiguousarray(log.q), np.ascontiguousarray(log.t)
-    dq = _native.velocity(t, q, "local-cubic", _HALF_WIDTH)
+    dq = _native.velocity(t, q, "local-cubic", _INITIAL_VELOCITY_HALF_WIDTH)
     starts = np.searchsorted(t, np.arange(t[0], t[-1], horizon))
     found = np.array(q)
     for first, last in zip(starts, [*starts[1:], len(t)], strict=True):

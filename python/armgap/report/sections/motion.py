@@ -16,7 +16,7 @@ __all__ = ["free_run", "horizons", "predictions"]
 
 _ARROW = " \N{RIGHTWARDS ARROW} "
 #: Distance beyond the range of measured positions up to which a free run is drawn, as a multiple of that range.
-_REACH = 1.0
+_DRAWN_RANGE_MARGIN = 1.0
 
 
 def predictions(data: Data) -> Section | None:
@@ -107,8 +107,8 @@ def _whole_run(s: Data, last: str) -> Any:
     low, high = min(s["measured"]), max(s["measured"])
     reach = (high - low) or 1.0
     chart = charts.lines("", "time [s]", "", s["t"], curves)
-    chart.y_range.bounds = (low - _REACH * reach, high + _REACH * reach)
+    chart.y_range.bounds = (low - _DRAWN_RANGE_MARGIN * reach, high + _DRAWN_RANGE_MARGIN * reach)
     values = [v for key in ("before", "after") for v in s[key] if v is not None]
-    if min(values) < low - _REACH * reach or max(values) > high + _REACH * reach:
+    if min(values) < low - _DRAWN_RANGE_MARGIN * reach or max(values) > high + _DRAWN_RANGE_MARGIN * reach:
         chart.y_range.start, chart.y_range.end = chart.y_range.bounds
     return chart

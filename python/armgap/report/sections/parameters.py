@@ -13,7 +13,7 @@ from armgap.report.words import figure, named, parameter_text, unit_text, value
 __all__ = ["parameters"]
 
 #: Half widths of the line on which parameters are drawn, and of its shaded middle, in standard deviations of the arm file.
-_REACH = 5.0
+_LINE_HALF_WIDTH = 5.0
 MIDDLE = 2.0
 _LINK_NUMBERS = 10
 
@@ -66,12 +66,12 @@ def _moved(entries: list[Any], *, causes: bool) -> Cell:
     if not all(isinstance(e, dict) for e in entries) or not nominal["sigma"]:
         return ""
     away = [(e["value"] - nominal["value"]) / nominal["sigma"] for e in (refit, final)]
-    dots = [(min(max(away[0] / _REACH, -1.0), 1.0), charts.REFIT)]
+    dots = [(min(max(away[0] / _LINE_HALF_WIDTH, -1.0), 1.0), charts.REFIT)]
     words = f"re-estimated {figure(away[0], 2)} sigma away"
     if causes:
-        dots.append((min(max(away[1] / _REACH, -1.0), 1.0), charts.AFTER))
+        dots.append((min(max(away[1] / _LINE_HALF_WIDTH, -1.0), 1.0), charts.AFTER))
         words += f", with causes {figure(away[1], 2)}"
-    return IntervalLine(dots, MIDDLE / _REACH, words)
+    return IntervalLine(dots, MIDDLE / _LINE_HALF_WIDTH, words)
 
 
 def _plausibility(data: Data) -> list[Table]:

@@ -18,7 +18,7 @@ from armgap.trial.methods import Method
 __all__ = ["CORRELATION", "refit_residual"]
 
 #: Smallest share of the residual torque's power that an effect has to explain to be named.
-_MIN_SHARE = 0.1
+_MIN_EFFECT_SHARE = 0.1
 
 
 def answer(case: SealedCase) -> Answer:
@@ -27,7 +27,7 @@ def answer(case: SealedCase) -> Answer:
     residual = refit_residual(case.arm, made)
     shares = [(s, _explained(s, residual)) for s in signatures(case.arm, made, made.motions[0])]
     best, share = min(shares, key=lambda x: _bic(*x))
-    if share < _MIN_SHARE:
+    if share < _MIN_EFFECT_SHARE:
         return Answer("correlation", "none")
     return Answer("correlation", "effect", (NamedCause(best.effect, best.joint, min(share, 1.0)),))
 
@@ -61,6 +61,6 @@ CORRELATION = Method(
     "correlation",
     "residual correlation",
     "arm re-estimated by least squares on torques with the arm file's sigmas as prior; names the effect whose signature "
-    f"has the largest squared correlation with the torque residual, if that is at least {_MIN_SHARE:g}",
+    f"has the largest squared correlation with the torque residual, if that is at least {_MIN_EFFECT_SHARE:g}",
     answer,
 )

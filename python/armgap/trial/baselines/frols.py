@@ -29,7 +29,7 @@ from armgap.trial.simulation.engine import TrialEngineMissingError
 __all__ = ["FROLS"]
 
 #: Largest numbers of terms among which BIC selects in FROLS and of causes named, and smallest share of the residual's power of a named cause.
-TERMS, MAX_CAUSES, _MIN_SHARE = 8, 4, 0.05
+TERMS, MAX_CAUSES, _MIN_CAUSE_SHARE = 8, 4, 0.05
 
 
 def answer(case: SealedCase) -> Answer:
@@ -51,7 +51,7 @@ def _named(terms: list[Signature], shares: list[float]) -> Answer:
     for s, share in zip(terms, shares, strict=True):
         key = (s.effect, s.joint)
         total[key] = total.get(key, 0.0) + share
-    best = sorted(((share, key) for key, share in total.items() if share >= _MIN_SHARE), key=lambda x: -x[0])[
+    best = sorted(((share, key) for key, share in total.items() if share >= _MIN_CAUSE_SHARE), key=lambda x: -x[0])[
         :MAX_CAUSES
     ]
     causes = tuple(NamedCause(effect, joint, min(max(share, 0.0), 1.0)) for share, (effect, joint) in best)
@@ -107,7 +107,7 @@ FROLS = Method(
     "frols",
     "SysIdentPy FROLS",
     f"sysidentpy.FROLS over the same signatures with the arm's columns projected out, up to {TERMS} terms by BIC; effects whose terms "
-    f"remove at least {_MIN_SHARE:.0%} of the residual's power, that share as probability",
+    f"remove at least {_MIN_CAUSE_SHARE:.0%} of the residual's power, that share as probability",
     answer,
     check=_check,
 )

@@ -17,7 +17,7 @@ from armgap.trial.simulation.engine import mujoco
 __all__ = ["build_spec", "set_coulomb", "set_inertial"]
 
 #: Longest internal time step of the MuJoCo model, s, and impedance of its friction constraints, as in the simulation of the logs.
-_STEP, IMPEDANCE = 2.5e-3, 0.9999
+_MAX_TIME_STEP_S, IMPEDANCE = 2.5e-3, 0.9999
 #: Positive number that stands for zero in masses, inertias and friction levels of the MuJoCo model, SI.
 TINY = 1e-9
 
@@ -26,7 +26,7 @@ def build_spec(arm: Arm) -> Any:
     """Return the MuJoCo specification of an arm: joints ``joint0``, ``joint1``, ..., each with one actuator and one position sensor."""
     mj = mujoco()
     spec = mj.MjSpec()
-    spec.option.timestep = arm.sample_period / np.ceil(arm.sample_period / _STEP - TINY)
+    spec.option.timestep = arm.sample_period / np.ceil(arm.sample_period / _MAX_TIME_STEP_S - TINY)
     spec.option.integrator = mj.mjtIntegrator.mjINT_RK4
     spec.option.disableflags |= mj.mjtDisableBit.mjDSBL_CONTACT
     spec.compiler.degree = False

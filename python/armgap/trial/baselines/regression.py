@@ -28,11 +28,11 @@ __all__ = ["Motion", "RegressionData", "motion", "regression_data", "regressor"]
 
 Array = NDArray[np.float64]
 #: Half width of the smoothing cubic, and length of a block of averaged samples, s.
-_HALF_WIDTH, BLOCK = 0.015, 0.010
+_SMOOTHING_HALF_WIDTH_S, BLOCK = 0.015, 0.010
 #: Speed below which a joint counts as slow and its rows are left out, as a share of the 95th percentile of its speed.
 SLOW = 0.02
 #: Smallest standard deviation assumed for a joint's residual torque, as a share of that of its torque.
-_TRUST = 0.005
+_MIN_RESIDUAL_SIGMA = 0.005
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ class RegressionData:
 def motion(log: Log) -> Motion:
     """Return the smoothed motion of a log."""
     h = float(np.median(np.diff(log.t)))
-    half = max(3, round(_HALF_WIDTH / h))
+    half = max(3, round(_SMOOTHING_HALF_WIDTH_S / h))
     # A command is held from one sample to the next; at the instant of a sample the mean of the old and the new one counts.
     held = 0.5 * (log.tau + np.vstack([log.tau[:1], log.tau[:-1]]))
     q, dq, ddq = (_savgol(log.q, half, order, h) for order in range(3))
@@ -123,7 +123,9 @@ def regression_data(case: SealedCase, scale: Array | None = None, held_out: bool
     if scale is None:
         error = tau - base @ np.linalg.lstsq(base[keep], tau[keep], rcond=None)[0]
         rows = [keep & (joint == j) for j in range(one.size)]
-        scale = np.array([max(float(np.std(error[r])), _TRUST * float(np.std(tau[r])), 1e-12) for r in rows])
+        scale = np.array(
+            [max(float(np.std(error[r])), _MIN_RESIDUAL_SIGMA * float(np.std(tau[r])), 1e-12) for r in rows]
+        )
     weight = scale[joint]
     return RegressionData(motions, scale, keep, (base / weight[:, None])[keep], (tau / weight)[keep])
 

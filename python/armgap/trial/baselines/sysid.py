@@ -35,7 +35,7 @@ from armgap.trial.simulation.engine import TrialEngineMissingError
 __all__ = ["SYSID"]
 
 #: Settings of the baseline: number of windows fitted, largest numbers of iterations and of causes, bounds of the arm's parameters in sigmas.
-_WINDOWS, ITERATIONS, MAX_CAUSES, _TRUST = 10, 10, 4, 4.0
+_FITTED_WINDOWS, ITERATIONS, MAX_CAUSES, _BOUND_SIGMAS = 10, 10, 4, 4.0
 #: Names of the effects that parameters of MuJoCo express, and of their equivalents.
 EXPRESSED = frozenset(
     {
@@ -137,7 +137,7 @@ def _at_bounds(insights: Any) -> list[str]:
 
 def _windows(case: SealedCase) -> list[Window]:
     windows = [w for log in case.training for w in cut(log.t - log.t[0], log.q, log.tau, HORIZON)]
-    chosen = np.unique(np.linspace(0, len(windows) - 1, _WINDOWS).round().astype(int))
+    chosen = np.unique(np.linspace(0, len(windows) - 1, _FITTED_WINDOWS).round().astype(int))
     return [windows[i] for i in chosen]
 
 
@@ -208,9 +208,9 @@ def _lagged(u: Array, t: Array, constant: float) -> Array:
 
 def _parameters(sysid: Any, arm: Arm, effect_parameters: list[EffectParameter]) -> Any:
     params = sysid.ParameterDict()
-    n, b, low = arm.n_joints, arm.n_inertial, np.maximum(arm.theta - _TRUST * arm.sigma, 0.05 * arm.theta)
-    low = np.where(arm.theta > 0, low, -_TRUST * arm.sigma)
-    high = arm.theta + _TRUST * arm.sigma
+    n, b, low = arm.n_joints, arm.n_inertial, np.maximum(arm.theta - _BOUND_SIGMAS * arm.sigma, 0.05 * arm.theta)
+    low = np.where(arm.theta > 0, low, -_BOUND_SIGMAS * arm.sigma)
+    high = arm.theta + _BOUND_SIGMAS * arm.sigma
 
     def inertial(spec: Any, p: Any) -> None:
         set_inertial(spec, arm, p.value)

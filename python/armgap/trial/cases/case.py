@@ -26,11 +26,11 @@ from armgap.trial.simulation.simulated_arm import SimulatedArm, Trace, run
 #: Largest number of motions drawn for one log before its case is given up.
 ATTEMPTS = 30
 #: Largest number of sizes tried for a hidden effect until it is visible, and increase of the size (on its scale from 0 to 1) from one to the next.
-GROWTHS, _GROWTH = 8, 0.15
+GROWTHS, _SIZE_INCREASE = 8, 0.15
 #: One in `SHRUNK_ONE_IN` hidden effects is made smaller while it stays visible: largest number of steps, and decrease of its size (0 to 1) per step.
-SHRUNK_ONE_IN, _SHRINKS, SHRINK = 5, 6, 0.4
+SHRUNK_ONE_IN, _MAX_SHRINK_STEPS, SHRINK = 5, 6, 0.4
 #: Position and speed beyond which a simulated arm counts as diverged, rad and rad/s (m and m/s).
-_REACH, SPEED = 10.0, 30.0
+_DIVERGED_POSITION, SPEED = 10.0, 30.0
 #: Largest number of controllers tried on an arm with hidden effects, each half as stiff as the preceding one.
 DETUNINGS = 6
 
@@ -240,10 +240,10 @@ def _fit_size(
     for growth in range(1, GROWTHS):
         if best is None or best[2].visible:
             break
-        best = at(size + _GROWTH * growth) or best
+        best = at(size + _SIZE_INCREASE * growth) or best
     if best is None or not best[2].visible or not may_shrink or number % SHRUNK_ONE_IN:
         return best
-    for _ in range(_SHRINKS):
+    for _ in range(_MAX_SHRINK_STEPS):
         smaller = at(best[1] - SHRINK)
         if smaller is None or not smaller[2].visible:
             break
@@ -305,7 +305,9 @@ def _log(arm: TrialArm, hidden: Sequence[HiddenEffect], name: str, motion: Excit
 
 def _sane(logs: dict[str, Trace]) -> bool:
     """Return whether no log of a case diverges."""
-    return all(bool(np.max(np.abs(x.q)) < _REACH and np.max(np.abs(x.dq_true)) < SPEED) for x in logs.values())
+    return all(
+        bool(np.max(np.abs(x.q)) < _DIVERGED_POSITION and np.max(np.abs(x.dq_true)) < SPEED) for x in logs.values()
+    )
 
 
 def _styles(motions: dict[str, tuple[str, Excitation]]) -> dict[str, str]:

@@ -25,7 +25,7 @@ AROUND, FEWEST = 0.012, 4
 #: Tolerances of a simulation, rad (m), tried in order until one is reached.
 TOLERANCES = (1e-8, 1e-6, 1e-4)
 #: Largest number of Gauss-Newton steps of a re-estimation, and step of its finite differences, in standard deviations of the prior.
-_STEPS, _STEP = 8, 1e-4
+_MAX_GAUSS_NEWTON_STEPS, _JACOBIAN_STEP_SIGMAS = 8, 1e-4
 
 
 @dataclass(frozen=True)
@@ -123,7 +123,7 @@ def refit(
         Estimated parameters [SI].
     """
     best, cost = theta, _cost(m, theta, theta, sigma, windows, noise, effects)
-    for _ in range(_STEPS):
+    for _ in range(_MAX_GAUSS_NEWTON_STEPS):
         step = _newton(m, best, theta, sigma, windows, noise, effects)
         for shrink in (1.0, 0.3, 0.1):
             trial = best + shrink * step
@@ -167,8 +167,8 @@ def _newton(
     columns = []
     for i, s in enumerate(sigma):
         moved = theta.copy()
-        moved[i] += _STEP * s
-        columns.append(((now - misses(m, moved, windows, effects)) / noise).ravel() / _STEP)
+        moved[i] += _JACOBIAN_STEP_SIGMAS * s
+        columns.append(((now - misses(m, moved, windows, effects)) / noise).ravel() / _JACOBIAN_STEP_SIGMAS)
     jacobian = np.vstack([np.column_stack(columns), np.eye(len(theta))])
     target = np.concatenate([(now / noise).ravel(), (prior - theta) / sigma])
     step: Array = sigma * np.linalg.lstsq(jacobian, target, rcond=None)[0]

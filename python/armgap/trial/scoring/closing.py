@@ -30,7 +30,7 @@ HISTORY = frozenset({"actuator_lag", "actuator_delay", "presliding", "joint_elas
 #: Names of effects that act in one log of a case only.
 EVENTS = frozenset({"external_pulse"})
 #: Fixed-point iterations that invert the reading of an eccentric encoder.
-_STEPS = 20
+_FIXED_POINT_ITERATIONS = 20
 
 
 @dataclass(frozen=True)
@@ -103,6 +103,6 @@ def _read(w: Window, placed: Sequence[NativeEffect]) -> Window:
 def _inverse(shown: float, a: float, b: float) -> float:
     """Return ``q`` from ``q + a sin q + b cos q = shown`` by iteration; a and b are small."""
     q = shown
-    for _ in range(_STEPS):
+    for _ in range(_FIXED_POINT_ITERATIONS):
         q = shown - a * math.sin(q) - b * math.cos(q)
     return q
