@@ -66,16 +66,16 @@ mod tests {
 }
 """
     found = list(TOOL["_of_rust"](rust, "a.rs"))
-    assert [(c.name, c.value, c.unit, c.reason, c.shared) for c in found] == [
-        ("STEP", "1e-3", "s", "Longest step, s: a reason.", True),
-        ("FIRST", "3", "", "Two lines of reason.", False),
-        ("SECOND", "4", "", "Two lines of reason.", False),
+    assert [(c.name, c.value, c.unit, c.reason) for c in found] == [
+        ("STEP", "1e-3", "s", "Longest step, s: a reason."),
+        ("FIRST", "3", "", "Two lines of reason."),
+        ("SECOND", "4", "", "Two lines of reason."),
     ]
     python = '#: Both [rad].\nLOW, HIGH = -1.0, 2 * 3\n_LATER_S = 5  # Beside.\nMOST = 7\n"""After."""\nFLAG = True\nNAME = "x"\n'
     found = list(TOOL["_of_python"](python, "a.py"))
-    assert [(c.name, c.value, c.unit, c.reason, c.shared) for c in found] == [
-        ("LOW", "-1.0", "rad", "Both [rad].", True),
-        ("HIGH", "2 * 3", "rad", "Both [rad].", True),
-        ("_LATER_S", "5", "s", "Beside.", False),
-        ("MOST", "7", "", "After.", True),
+    assert [(c.name, c.value, c.unit, c.reason) for c in found] == [
+        ("LOW", "-1.0", "rad", "Both [rad]."),
+        ("HIGH", "2 * 3", "rad", "Both [rad]."),
+        ("_LATER_S", "5", "s", "Beside."),
+        ("MOST", "7", "", "After."),
     ]

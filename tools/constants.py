@@ -28,7 +28,7 @@ _UNIT = re.compile(rf"\[({_UNITS}|SI)\]|, ({_UNITS})(?=[.:;,]|$)")
 #: Suffixes of constants' names, with the units that these suffixes stand for.
 _SUFFIXES = {"_S": "s", "_RAD": "rad", "_M": "m", "_HZ": "Hz", "_US": "us", "_BYTES": "bytes", "_SAMPLES": "samples"}
 _RUST = re.compile(
-    r"((?:^///[^\n]*\n)*)^(pub(?:\([a-z]+\))? )?const ([A-Z][A-Z0-9_]*): ([^=]+?) =\s*([^;]+);",
+    r"((?:^///[^\n]*\n)*)^(?:pub(?:\([a-z]+\))? )?const ([A-Z][A-Z0-9_]*): ([^=]+?) =\s*([^;]+);",
     re.MULTILINE,
 )
 _NUMBER = re.compile(
@@ -40,14 +40,13 @@ _TESTS = re.compile(r"^#\[cfg\(test\)\]\n(?:#\[.*\]\n)*(?:pub(?:\(\w+\))? )?mod 
 
 
 class Constant(NamedTuple):
-    """A named number: name, value as the source writes it, unit (empty for a ratio or count), comment, file, whether other files may use it."""
+    """A named number: name, value as the source writes it, unit (empty for a ratio or count), comment, file."""
 
     name: str
     value: str
     unit: str
     reason: str
     file: str
-    shared: bool
 
 
 def constants(folder: Path) -> list[Constant]:
@@ -69,14 +68,14 @@ def _of_rust(text: str, file: str) -> Iterator[Constant]:
     program = _TESTS.split(text)[0]
     reason, end = "", -1
     for match in _RUST.finditer(program):
-        comment, public, name, kind, value = match.groups()
+        comment, name, kind, value = match.groups()
         own = " ".join(line.strip().removeprefix("///").strip() for line in comment.splitlines())
         # A comment also applies to the constants on the lines directly below its own.
         reason = own or (reason if match.start() == end + 1 else "")
         end = match.end()
         if _NUMBER.sub("", value).strip() or not re.search(r"\d|f64::", value) or "&" in kind:
             continue
-        yield Constant(name, " ".join(value.split()), _unit(name, reason), reason, file, bool(public))
+        yield Constant(name, " ".join(value.split()), _unit(name, reason), reason, file)
 
 
 def _of_python(text: str, file: str) -> Iterator[Constant]:
@@ -94,7 +93,7 @@ def _of_python(text: str, file: str) -> Iterator[Constant]:
         reason = shared = reason or (shared if statement.lineno == end + 1 else "")
         end = statement.end_lineno or statement.lineno
         for name, number in _pairs(target, value):
-            yield Constant(name, number, _unit(name, reason), reason, file, not name.startswith("_"))
+            yield Constant(name, number, _unit(name, reason), reason, file)
 
 
 def _pairs(target: ast.expr, value: ast.expr) -> Iterator[tuple[str, str]]:
