@@ -39,6 +39,7 @@ _MAX_REPAIRED_FACTOR = 2e3
 _COMMON_FACTOR_RATIO = 1.5
 # Parameters may differ from the arm file by this factor while a column's factor is estimated.
 _PARAMETER_BOUND_FACTOR = 2.0
+# Iterations in which factors and parameters are estimated in turn.
 _FACTOR_ITERATIONS = 4
 # Reduction of the mean log share of unexplained torque that a factor on torques needs; with a reduction below the second number predictions have
 # to agree: friction without bound takes much of a torque in another unit.

@@ -27,6 +27,7 @@ _PER_JOINT = (
     ("position_max", "upper"),
     *((key, key) for key in ("speed", "acceleration", "effort")),
 )
+# Rows and columns of the six independent entries of a symmetric 3 x 3 matrix, in the order of arm files.
 _ROWS, _COLUMNS = (0, 0, 1, 0, 1, 2), (0, 1, 1, 2, 2, 2)
 
 

@@ -43,6 +43,7 @@ _SPEED_SPAN_S = 0.02
 _DEGREE_RATIO = (40.0, 80.0)
 # Largest number of samples that determine the sample period, and whether positions change in whole encoder counts.
 _MAX_INSPECTED_SAMPLES = 100_000
+# Ratios of a differenced position to the velocity column that show degrees beyond doubt, and millimetres.
 _SURE_RATIO = (52.0, 63.0)
 _MILLI_RATIO = (700.0, 1400.0)
 # Ratio of a commanded torque to the arm's limit above which the torque is in another unit.

@@ -23,7 +23,7 @@ __all__ = ["check"]
 
 _TAIL = 8  # bytes at the end of a file: length of the footer, and marker bytes
 _HEADER = 1 << 16  # largest size of a page header, bytes: usually tens of bytes, with statistics more
-_MAX_THRIFT_DEPTH = 16
+_MAX_THRIFT_DEPTH = 16  # largest depth of structures within structures: headers and footers have less than half of it
 _MOST_ENTRIES = 1 << 22
 _DATA_PAGE, _DATA_PAGE_V2 = 0, 3
 # Field numbers of the Parquet metadata structures in parquet.thrift.

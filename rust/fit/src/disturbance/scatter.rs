@@ -26,7 +26,7 @@ const MEDIAN_HALF_WIDTH: f64 = 1.0;
 const FEWEST_MEDIAN_POINTS: usize = 40;
 
 /// Ratio of the standard deviation to the median absolute value of a normal variable.
-const MAD_TO_SIGMA: f64 = 1.4826;
+pub(super) const MAD_TO_SIGMA: f64 = 1.4826;
 
 /// Least standard deviation of the residual torque, relative to the joint's typical torque.
 const FLOOR: f64 = 0.002;

@@ -8,6 +8,7 @@
 use super::bell::{Bell, all_but};
 use super::linear::{Fitted, Linear};
 use super::residual::Residual;
+use super::scatter::MAD_TO_SIGMA;
 use crate::log::track::median;
 use rayon::prelude::*;
 
@@ -204,7 +205,7 @@ impl<const N: usize> Search<'_, N> {
             return 1.0;
         }
         sizes.sort_by(f64::total_cmp);
-        let middle = 1.4826 * median(sizes.clone());
+        let middle = MAD_TO_SIGMA * median(sizes.clone());
         middle.max(sizes[sizes.len() * 9 / 10] / 1.645).max(1.0)
     }
 

@@ -11,7 +11,7 @@ use armgap_core::integrate::{Interval, State, StepLimits, advance_in_stable_step
 use armgap_core::plant::{Mode, Plant};
 use armgap_core::transmission::{LatentState, Sides, Transmission};
 
-/// Largest product of a motor's natural frequency, rad/s, and step length in the simulation of latent states.
+/// Largest phase of a motor's natural oscillation within one step of the simulation of latent states, rad.
 const MAX_PHASE_PER_STEP: f64 = 1.0;
 
 /// Time constant with which the simulated deflection of a joint with its encoder on the motor is corrected to that from the motor's torque balance,
