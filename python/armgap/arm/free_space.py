@@ -12,7 +12,7 @@ __all__ = ["FreeSpace"]
 
 Array = NDArray[np.float64]
 
-#: Spacing of the points along a link's axis, as a part of the link's radius and of the link's length, whichever is larger.
+#: Spacing of the points on a link's axis whose distances to obstacles are computed: the larger of these parts of the link's radius and of its length.
 _POINT_SPACING_PER_RADIUS, _POINT_SPACING_PER_LENGTH = 0.5, 1 / 50
 #: Part of the last link, from its joint on, that is not checked against the link before it: links touch at the joint they share.
 JOINED = 0.5

@@ -194,7 +194,7 @@ class Estimator:
 
     @property
     def covariance(self) -> NDArray[np.float64]:
-        """Covariance `P` for an error of unit variance, shape (n_parameters, n_parameters)."""
+        """Covariance `P` of the parameters for equation errors of unit variance, shape (n_parameters, n_parameters)."""
         return self._native.covariance
 
     @property

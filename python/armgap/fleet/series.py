@@ -78,12 +78,12 @@ class Odd:
 
 
 def series_of(parameters: pl.DataFrame) -> list[Series]:
-    """Return the estimates of a fleet's parameters by robot and visit, one `Series` per parameter.
+    """Return the estimates of a fleet's parameters, one `Series` per parameter, by robot and by entry of the manifest (a visit to the robot).
 
     Parameters
     ----------
     parameters : polars.DataFrame
-        Table as in ``parameters.parquet``.
+        Columns robot, time, of, name, value and sigma: one row per entry and parameter, as `armgap fleet` writes to ``parameters.parquet``.
     """
     place = ["robot", "of", "name"]
     day = pl.col("time").fill_null("").str.slice(0, _DAY)

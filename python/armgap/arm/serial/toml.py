@@ -79,7 +79,10 @@ def serial_toml(arm: Arm) -> str:
 
 
 def _inertial_lines(ten: Array) -> list[str]:
-    """Return TOML lines with a link's mass, centre and central inertia, or, if rounding requires, ten inertial parameters; empty if all are zero."""
+    """Return TOML lines with a link's mass, centre and central inertia; empty if all are zero.
+
+    Where the ten inertial parameters do not follow from these to within rounding, they are written themselves.
+    """
     if not ten.any():
         return []
     if ten[0] > 0:

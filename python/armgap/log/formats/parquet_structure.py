@@ -123,7 +123,7 @@ class _Thrift:
 
 
 def check(stream: BinaryIO, path: Path) -> None:
-    """Raise `LogReadError` unless all pages lie within the file and add up to what the footer says."""
+    """Raise `LogReadError` unless all pages lie within the file and hold as many rows as the footer says."""
     try:
         footer, end = _footer(stream)
         for number, group in enumerate(_list(footer, _ROW_GROUPS), start=1):

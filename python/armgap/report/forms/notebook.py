@@ -60,7 +60,8 @@ class NotebookDisplay:
         Parameters
         ----------
         finding : {"gap", "where", "ranking", "prediction", "error"} or Cause, default "gap"
-            Gap, map of the residual torque, ranking of candidates, predicted and measured positions, their difference; or a cause, for its evidence.
+            Prediction error by joint, map of the residual torque, ranking of candidates, predicted and measured
+            positions, their difference; or a cause, for its evidence.
         joint : int, default 1
             1-based joint of a prediction or an error.
         log : str, optional

@@ -21,8 +21,9 @@ __all__ = ["BANDS", "CONFIDENT", "Figures", "Share", "figures", "opened_keys"]
 
 #: Probability from which a cause counts as named with confidence.
 CONFIDENT = 0.9
-#: Lower edges of the bands in which cases are counted by the prediction error that their least visible hidden effect leaves after re-estimation, as a
-#: multiple of the noise floor. Effects in the first band are visible by the moved parameters only.
+#: Lower edges of the bands in which cases are counted by how well their hidden effects are seen: by the prediction error, as a multiple of the noise
+#: floor, that the arm without its least visible effect leaves once its parameters are re-estimated. In the first band an effect shows only as a
+#: change of the estimated parameters.
 BANDS = (0.0, 2.0, 10.0, 50.0, 250.0)
 
 

@@ -202,7 +202,7 @@ pub struct JointPoint<T> {
     pub load: T,
     /// Nominal friction `b |dq| + fc` at the joint's speed, N m (N).
     pub friction: T,
-    /// Direction in which the next joint slides (for the last joint, the first): -1, 0 or 1.
+    /// Direction in which another joint slides, -1 or 1, or 0 if it sticks: of the joint after this one, or, for the last joint, of the first.
     pub other: T,
     /// Hysteresis state of the joint, N m (N); see [`Effect::hysteresis_after`].
     pub memory: T,

@@ -214,7 +214,7 @@ impl<T: Real, const R: usize, N: Count> Rls<T, R, N> {
     }
 }
 
-/// Arguments of one call of [`Rls::update`], compiled for each instruction set.
+/// One call of [`Rls::update`] as data, so that [`Kernel::run`] can be compiled for each instruction set and chosen at run time.
 struct UpdateKernel<'a, T: Real, N: Count, const M: usize, const R: usize> {
     rls: &'a mut Rls<T, R, N>,
     rows: [[T; R]; M],

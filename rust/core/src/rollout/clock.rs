@@ -2,8 +2,8 @@
 
 use crate::real::Real;
 
-/// Largest number of mode changes of a lane within one interval, after which the scalar integrator takes the rest of the interval: 6 per joint, at
-/// least 12.
+/// Largest number of changes between sliding and sticking that the vectorised integrator follows in one run (a lane of the batch) within one sample
+/// interval: 6 per joint, at least 12. The scalar integrator takes the rest of the interval.
 pub(super) const fn max_changes(joints: usize) -> usize {
     if joints < 2 { 12 } else { 6 * joints }
 }

@@ -85,12 +85,12 @@ struct FittedZeros<const N: usize> {
     offsets: Vec<InitialStateOffset<N>>,
 }
 
-/// Weightings of training and holdout windows around one hypothesis.
+/// Inverse covariances of the windows' prediction errors under one hypothesis.
 #[derive(Debug, Clone)]
 pub struct SplitWeighting<const N: usize> {
-    /// Weighting of the training windows.
+    /// By which errors in the training windows are weighted.
     pub training: Weighting<N>,
-    /// Weighting of the holdout windows.
+    /// By which errors in the holdout windows are weighted.
     pub holdout: Weighting<N>,
 }
 

@@ -9,7 +9,8 @@ use crate::locate::regimes::{ResidualTorque, ResidualTorques};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-/// Size of the energy balance (-1 to 1) beyond which a residual torque counts as mainly taking or mainly giving energy.
+/// Size of the energy balance (work of the residual torque over the integral of its absolute power, -1 to 1) beyond which the torque counts as mainly
+/// taking or mainly giving energy.
 const ONE_WAY: f64 = 0.5;
 
 /// Direction in which a residual torque exchanges energy with the arm.

@@ -42,8 +42,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     }
 }
 
-/// Logs cut into stretches that alternately form a new training set and a new holdout, in this order; none where a log is too short for two stretches
-/// of several windows of `horizon`, s.
+/// A new training set and a new holdout, from alternate stretches of all logs; none if any log is too short for two stretches of several windows of
+/// `horizon` seconds.
 pub fn crosswise<'a>(
     training: &[LogData<'a>],
     holdout: &[LogData<'a>],
