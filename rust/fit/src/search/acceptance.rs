@@ -30,8 +30,13 @@ const MATTERS_IN_SMALL: f64 = 0.5;
 /// Ratio of the holdout's cost to its noise floor (the cost that measurement noise alone leaves) up to which no gap is left to explain.
 pub const ABOVE_FLOOR: f64 = 1.25;
 
-/// Largest ratio of a typical holdout window's cost to the cost that noise alone leaves at which only a few outlying windows make up the gap.
+/// Largest ratio of the holdout's cost to the cost that noise alone leaves at which a model leaves no more than noise; of a typical holdout window's
+/// cost, at which only a few outlying windows make up the gap.
 const AT_FLOOR: f64 = 1.5;
+
+/// Mean difference of the windows' costs between the best candidate and another one, in standard errors of this mean, below which the other one is a
+/// close rival.
+pub const CLOSE: f64 = 3.0;
 
 /// Least decrease of the cost, summed over the windows that a candidate improves, for the candidate to explain outlying windows: in standard
 /// deviations of a typical window's cost where that cost is noise, in typical windows' costs elsewhere.
@@ -94,7 +99,7 @@ pub const LOOK_ALIKES: usize = 3;
 
 /// Decrease of the cost by a candidate, relative to the decrease by the best one, from which both do almost as well and the one with fewer parameters
 /// is preferred.
-pub const ALMOST: f64 = 0.95;
+const ALMOST: f64 = 0.95;
 
 /// Decrease of the cost by a candidate with fewer parameters, relative to the decrease by the best one, from which the simpler candidate is preferred
 /// if even the best one leaves most of the gap to other causes.
@@ -104,7 +109,7 @@ const ALMOST_IN_DOUBT: f64 = 0.6;
 const MOST_OF_GAP: f64 = 0.5;
 
 /// Difference between the costs of the best candidate and another one, relative to the decrease of the cost by the best one, below which the two are
-/// look-alikes, which the logs cannot distinguish.
+/// look-alikes, which the logs cannot distinguish, unless the best one leaves noise alone and the other significantly more.
 const LOOK_ALIKE: f64 = 0.03;
 
 /// Smallest RMS improvement of the predictions, relative to the motion within a window, for which an effect is named as a cause, given the RMS error
@@ -118,7 +123,13 @@ impl<const N: usize, const P: usize> SearchNode<N, P> {
     /// or by less than one standard error over the windows.
     pub fn is_alike(&self, best: &Candidate<P>, other: &Candidate<P>) -> bool {
         let advantage = self.base.score() - best.score();
-        other.score() - best.score() < (LOOK_ALIKE * advantage).max(3.0) || best.z_over(other) < 1.0
+        let is_near = other.score() - best.score() < (LOOK_ALIKE * advantage).max(3.0);
+        (is_near && !self.excludes(best, other)) || best.z_over(other) < 1.0
+    }
+
+    /// Whether candidate `best` shows that candidate `other` is not the cause: it leaves no more than noise, and `other` significantly more.
+    fn excludes(&self, best: &Candidate<P>, other: &Candidate<P>) -> bool {
+        excludes(best.holdout.iter().sum(), self.floor, best.z_over(other))
     }
 
     /// Whether a candidate explains windows whose errors stand far out of the noise, in the training logs and in the holdout, while no other window
@@ -165,6 +176,13 @@ impl<const N: usize, const P: usize> SearchNode<N, P> {
                 !matches!(e.law.spec().parameters[0].quantity, Quantity::Time | Quantity::ShaftStiffness)
             })
     }
+}
+
+/// Whether a candidate that leaves the cost `left` on the holdout, over a floor of `floor`, shows that another one is not the cause, whose windows'
+/// costs are higher by `z` standard errors of their mean difference. Beside unmodelled torques a small difference of the costs decides nothing: these
+/// torques are alike in all windows. Beside noise alone it does.
+fn excludes(left: f64, floor: f64, z: f64) -> bool {
+    left < AT_FLOOR * floor && z > CLOSE
 }
 
 /// Whether the window costs `mine` are lower than `base` by more than `least`, summed over the windows that improve, and hardly higher, summed over
@@ -353,6 +371,13 @@ mod tests {
         assert_eq!(fewest_values(&[hysteresis, Offer { values: 0, ..rounding }], 0, ALMOST), 0);
         assert_eq!(fewest_values(&[hysteresis, offer(60.0, 1)], 0, ALMOST), 0);
         assert_eq!(fewest_values(&[hysteresis, Offer { moves: false, ..rounding }], 0, ALMOST), 0);
+    }
+
+    #[test]
+    fn a_small_difference_decides_beside_noise_alone() {
+        assert!(excludes(110.0, 100.0, 5.0));
+        assert!(!excludes(110.0, 100.0, 2.5), "no significant difference");
+        assert!(!excludes(500.0, 100.0, 5.0), "beside unmodelled torques");
     }
 
     #[test]

@@ -8,14 +8,10 @@
 use crate::likelihood::context::DiagnosisContext;
 use crate::likelihood::solve::Effort;
 use crate::model::hypothesis::Hypothesis;
-use crate::search::acceptance::MATTERS;
+use crate::search::acceptance::{CLOSE, MATTERS};
 use crate::search::attribute::{Candidate, SearchNode};
 use crate::search::rivals::equivalent;
 use armgap_core::arm::Arm;
-
-/// Mean difference of the windows' costs between the best candidate and another one, in standard errors of this mean, below which the other one is a
-/// close rival.
-const CLOSE: f64 = 3.0;
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
     /// The node with its candidates fitted again under window weights made around its best candidate or around the closest rival, whichever make the
