@@ -17,8 +17,8 @@ __all__ = ["FlatTop", "JointChannels", "joint", "step_of"]
 if not TYPE_CHECKING:
     __getattr__ = old_names(__name__)
 
-# Largest number of changes between samples from which the step of a channel is determined.
-_MAX_SAMPLE_CHANGES = 200_000
+# Largest number of samples from which the step of a channel is determined.
+_MAX_CHANNEL_SAMPLES = 200_000
 # Largest number of changes of a channel between samples, the smallest ones, to which its step is fitted.
 _SMALLEST = 2000
 # Changes of a channel are whole multiples of a step if at least this share of them (second) lies this close (first, in steps).
@@ -112,8 +112,8 @@ def step_of(values: NDArray[np.float64]) -> float | None:
     >>> round(step_of(q), 9), step_of(np.sin(np.arange(400) / 5.0))
     (0.002, None)
     """
-    moved = np.abs(np.diff(values[:_MAX_SAMPLE_CHANGES]))
-    moved = np.sort(moved[moved > 1e-12 * max(float(np.abs(values[:_MAX_SAMPLE_CHANGES]).max()), 1e-300)])[:_SMALLEST]
+    moved = np.abs(np.diff(values[:_MAX_CHANNEL_SAMPLES]))
+    moved = np.sort(moved[moved > 1e-12 * max(float(np.abs(values[:_MAX_CHANNEL_SAMPLES]).max()), 1e-300)])[:_SMALLEST]
     if len(moved) < 20:
         return None
     # The smallest change seen may itself be several steps; the largest step that fits is taken.
@@ -133,7 +133,7 @@ def _fitted(moved: NDArray[np.float64], step: float) -> float | None:
 
 def _smallest(values: NDArray[np.float64]) -> float:
     """Return the size of changes between samples at rest, for a channel without steps."""
-    moved = np.abs(np.diff(values[:_MAX_SAMPLE_CHANGES]))
+    moved = np.abs(np.diff(values[:_MAX_CHANNEL_SAMPLES]))
     moved = moved[moved > 0]
     return float(np.quantile(moved, 0.05)) if len(moved) else 0.0
 

@@ -5,7 +5,7 @@ use crate::likelihood::context::DiagnosisContext;
 use crate::likelihood::covariance::NORMAL_95;
 use crate::model::hypothesis::EffectInstance;
 use crate::result::report::{Bound, RuledOut, SeveralJoints, Status};
-use crate::search::acceptance::{MATTERS, restores};
+use crate::search::acceptance::{ALMOST, MATTERS, restores};
 use crate::search::model_search::Attribution;
 use armgap_core::arm::Arm;
 use armgap_core::effect::{Scope, Spec, Trial, catalogue};
@@ -144,7 +144,8 @@ fn rivalled<const N: usize, const P: usize>(
             node.candidates.iter().find(|c| c.effect.is_some_and(|e| e.same_place(place)))
         };
         let (cause, rival) = (at(adopted)?, at(place)?);
-        let by_motion = node.share(cause) > MATTERS && node.is_alike(cause, rival);
+        let is_near = node.share(cause) > MATTERS && node.share(rival) > ALMOST * node.share(cause);
+        let by_motion = is_near && !node.excludes(cause, rival);
         (by_motion || (restores(node, cause) && restores(node, rival))).then_some(*adopted)
     })
 }

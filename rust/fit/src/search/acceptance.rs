@@ -99,7 +99,7 @@ pub const LOOK_ALIKES: usize = 3;
 
 /// Decrease of the cost by a candidate, relative to the decrease by the best one, from which both do almost as well and the one with fewer parameters
 /// is preferred.
-const ALMOST: f64 = 0.95;
+pub const ALMOST: f64 = 0.95;
 
 /// Decrease of the cost by a candidate with fewer parameters, relative to the decrease by the best one, from which the simpler candidate is preferred
 /// if even the best one leaves most of the gap to other causes.
@@ -128,7 +128,7 @@ impl<const N: usize, const P: usize> SearchNode<N, P> {
     }
 
     /// Whether candidate `best` shows that candidate `other` is not the cause: it leaves no more than noise, and `other` significantly more.
-    fn excludes(&self, best: &Candidate<P>, other: &Candidate<P>) -> bool {
+    pub fn excludes(&self, best: &Candidate<P>, other: &Candidate<P>) -> bool {
         excludes(best.holdout.iter().sum(), self.floor, best.z_over(other))
     }
 
