@@ -208,9 +208,8 @@ def test_a_size_of_all_torques_that_predictions_refute_is_not_said(two_links: li
     factors = torque_unit.Factors(corrections, -5.0, checks, doubtful=True)
     for scale, said in ((1.0, False), (3.0, True)):
         file = replace(arm, theta=scale * arm.theta, sigma=0.01 * arm.theta)
-        base = EquationError([Rows.of(log, file) for log in two_links], file)
         now = stage.Examined(two_links[:1], two_links[1:], file, (), Corrections())
-        assert stage._prefers(factors, [], base, now, 0.25) is said
+        assert stage._prefers(factors, [], now, 0.25) is said
 
 
 def test_what_a_factor_leaves_unexplained_is_left_to_predictions(two_links: list[Log], arm: Arm) -> None:

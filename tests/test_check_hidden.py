@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -69,7 +70,13 @@ def found_among(
     refits = iter([refit(stands), *(refit(missed) for *_, missed in others)])
     monkeypatch.setattr(Refit, "of", lambda *_: next(refits))
     suspects = [
-        Suspect(reading("torque_sign", column, Corrections(flip=(column,))), Fit(arm.theta, np.full(2, share)), gain)
+        Suspect(
+            reading("torque_sign", column, Corrections(flip=(column,))),
+            Fit(arm.theta, np.full(2, share)),
+            gain,
+            closeness=math.log(share),
+            unexplained=np.full(2, share),
+        )
         for column, gain, share, _ in others
     ]
     found = confirm(Fit(arm.theta, np.full(2, 0.5)), suspects, logs[:1], logs[1:], arm, 0.25)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from armgap import Arm, Log, simulate
-from armgap.check import Check, Corrections, examine
+from armgap.check import Check, Corrections, drive_limit, examine
 from armgap.check.contradiction import screen
 from armgap.check.equation_error import EquationError, Rows, bounds
 from armgap.simulation import Effect
@@ -60,10 +60,47 @@ def test_a_drive_that_slews_far_behind_its_command_has_no_other_columns(arm: Arm
         moved = simulate(off(arm), t, delivered, noise=2e-5, seed=seed, name=f"run {seed}")
         logs.append(replace(moved, tau=command))
     base = EquationError([Rows.of(log, arm) for log in logs], arm)
-    assert screen(base, logs, arm)[0].share[0] > 0.5
+    assert screen(base, logs, arm)[0].fit.share[0] > 0.5
     assert not any(c.severity in ("error", "repaired") for c in checked(logs, arm))
     exchanged = [replace(log, tau=-log.tau[::-1].copy()) for log in logs]
     assert any(c.check == "joint_order" for c in checked(exchanged, arm)), "torques of another run belong to no arm"
+
+
+@pytest.mark.parametrize(
+    ("defect", "name", "remedy"),
+    [
+        ({"flip": "tau2"}, "torque_sign", "--flip tau2"),
+        ({"zero": "q2=90deg"}, "position_zero", "--zero q2=-90deg"),
+        ({"swap": "q1,q2"}, "joint_order", "--swap q1,q2"),
+    ],
+)
+def test_a_drive_that_saturates_hides_no_defect(arm: Arm, defect: dict[str, str], name: str, remedy: str) -> None:
+    logs = carried(arm, Effect("torque_saturation", 2, {"level": 0.6}), scale=3.0)
+    assert checked(logs, arm) == ()
+    corrections = Corrections.parse(**defect)
+    [check] = checked([corrections.on_log(log) for log in logs], arm)
+    assert (check.check, check.severity) == (name, "error")
+    assert remedy in check.remedies
+
+
+def test_torques_that_come_late_before_a_drive_that_saturates(arm: Arm) -> None:
+    logs = carried(arm, Effect("torque_saturation", 2, {"level": 0.6}), scale=3.0)
+    late = [replace(log, tau=np.vstack([np.repeat(log.tau[:1], 3, axis=0), log.tau[:-3]])) for log in logs]
+    [check] = checked(late, arm)
+    assert (check.check, check.severity) == ("time_shift", "repaired")
+    assert check.remedies == ("--shift tau=-0.0075",)
+
+
+def test_levels_are_those_of_the_drives(arm: Arm) -> None:
+    limited, free = (
+        carried(arm, *hidden, scale=3.0) for hidden in ([Effect("torque_saturation", 2, {"level": 0.6})], [])
+    )
+    found = drive_limit.delivered(limited, arm)
+    assert found.levels[0] == np.inf
+    assert found.levels[1] == pytest.approx(0.6, rel=0.05)
+    assert found.unexplained.max() < drive_limit.TRIED
+    assert np.isinf(drive_limit.delivered(free, arm).levels).all()
+    assert drive_limit.deliver(free, np.full(2, np.inf)) == free
 
 
 def test_noise_above_a_limited_torque_is_no_sign_of_other_columns(arm: Arm) -> None:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from armgap import _native
 from armgap.arm.arm import Arm
+from armgap.check.drive_limit import Delivered, as_commanded, deliver, delivered
 from armgap.check.equation_error import EquationError, Fit, Rows, bounds
 from armgap.check.readings import (
     gravity_missing,
@@ -32,7 +33,18 @@ from armgap.log.log import Log
 
 Array = NDArray[np.float64]
 
-__all__ = ["AS_GOOD", "BETTER", "EXPLAINS", "READINGS", "Found", "Refit", "Suspect", "confirm", "screen"]
+__all__ = [
+    "AS_GOOD",
+    "BETTER",
+    "EXPLAINS",
+    "READINGS",
+    "Found",
+    "Refit",
+    "Suspect",
+    "confirm",
+    "screen",
+    "start_beside_file",
+]
 
 READINGS: tuple[Callable[[Arm, float], Iterable[Reading]], ...] = (
     torque_sign.readings,
@@ -72,6 +84,9 @@ _ACCOUNTS_FOR = 0.1
 _NEGLIGIBLE = 1e-3
 # Ratio of prediction errors up to which another reading, with an equation error equal to within `_MIN_REFIT_GAIN`, is named with the best reading.
 _ALIKE_ERROR_RATIO = 1.05
+# Standard deviations of the arm file between its values and those of the equation of motion from which a diagnosis starts from both: as many as are
+# reported as implausible. Inertial values three times too large, with a standard deviation of 5 %, are 13 off: a fit from the arm file stays there.
+_FAR = 5.0
 # Standard deviations beyond the bounds from which parameters count as impossible.
 _SURE = 3.0
 
@@ -91,8 +106,7 @@ class Refit:
     @classmethod
     def of(cls, arm: Arm, training: Sequence[Log], holdout: Sequence[Log], horizon: float) -> Refit:
         """Fit the arm's parameters to training logs, with arm file as prior and equation-error fit as second start, and judge them on the holdout."""
-        errors = EquationError([Rows.of(log, arm) for log in training], arm)
-        start = errors.fit(*bounds(arm)).theta if len(errors) else arm.theta
+        start = _start(training, arm)
         found = _native.refit(
             arm.to_native(),
             start.tolist(),
@@ -102,6 +116,15 @@ class Refit:
         )
         theta, sigma, error, motion = (np.asarray(found[key]) for key in ("theta", "sigma", "refit", "motion"))
         return cls(theta, sigma, error, motion)
+
+    @classmethod
+    def within_limits(cls, arm: Arm, training: Sequence[Log], holdout: Sequence[Log], horizon: float) -> Refit:
+        """Fit and judge as `of`, with torques within the limits of the drives where the logs need such limits (`drive_limit.delivered`).
+
+        The limits are those of all logs together: a drive may saturate on the holdout alone.
+        """
+        levels = delivered([*training, *holdout], arm).levels
+        return cls.of(arm, deliver(training, levels), deliver(holdout, levels), horizon)
 
     def possible(self, arm: Arm) -> bool:
         """Whether the parameters are possible for an arm whose file is right about signs and orders of magnitude."""
@@ -133,6 +156,32 @@ class Refit:
         return float(np.exp(np.mean(np.log(np.maximum(self.error / moved, _NEGLIGIBLE)))))
 
 
+def _start(logs: Sequence[Log], arm: Arm) -> Array:
+    """Return the parameters of the bounded fit to the equation of motion, from which a fit of predictions starts besides the arm file's."""
+    errors = EquationError([Rows.of(log, arm) for log in logs], arm)
+    return errors.fit(*bounds(arm)).theta if len(errors) else arm.theta
+
+
+def start_beside_file(logs: Sequence[Log], arm: Arm) -> list[float] | None:
+    """Return parameters from which a diagnosis starts besides the arm file's; None where the equation of motion agrees with the arm file.
+
+    Parameters
+    ----------
+    logs : sequence of Log
+        Training logs.
+    arm : Arm
+        Nominal model of the arm, of a planar kind.
+
+    Returns
+    -------
+    list of float, optional
+        Parameters within the bounds [SI], `_FAR` standard deviations of the arm file or more from its values.
+    """
+    start = _start(deliver(logs, delivered(logs, arm).levels), arm)
+    far = np.abs(start - arm.theta) > _FAR * arm.sigma
+    return start.tolist() if far.any() else None
+
+
 @dataclass(frozen=True)
 class Found:
     """Reading of the input that predictions confirm where the log as it stands is contradicted.
@@ -157,46 +206,54 @@ class Found:
 
 @dataclass(frozen=True)
 class Suspect:
-    """Candidate reading of the input, its fit, and the decrease `gain` of the fit's cost relative to the log as it stands."""
+    """Candidate reading of the input: its fit, the decrease `gain` of the fit's cost, and `closeness` and `unexplained` of the delivered torques."""
 
     reading: Reading
     fit: Fit
     gain: float
+    closeness: float
+    unexplained: Array
 
 
-def screen(base: EquationError, logs: Sequence[Log], arm: Arm) -> tuple[Fit, list[Suspect]]:
-    """Return the fit to the logs as they stand (`base`), and readings of the input with a smaller equation error, the smallest first."""
-    low, high = bounds(arm)
-    stands = base.fit(low, high)
+def screen(base: EquationError, logs: Sequence[Log], arm: Arm) -> tuple[Delivered, list[Suspect]]:
+    """Return the fit to the logs as they stand (`base`), and readings of the input with a smaller equation error, the smallest first.
+
+    Where no reading explains the torques with drives that deliver their commands, each is fitted together with the limits of the drives.
+    """
     travel = max(float(np.ptp(log.q, axis=0).max()) for log in logs)
-    suspects = []
-    for readings in READINGS:
-        for reading in readings(arm, travel):
-            fit = _read(reading, base, logs, arm, low, high)
-            if (gain := stands.cost - fit.cost) > _MIN_REFIT_GAIN:
-                suspects.append(Suspect(reading, fit, gain))
+    tried = [reading for readings in READINGS for reading in readings(arm, travel)]
+    stands = as_commanded(base, *bounds(arm))
+    fits = [_fit(reading, base, logs, arm) for reading in tried]
+    if all(fit.limits_tried.any() for fit in (stands, *fits)):
+        stands = delivered(logs, arm)
+        fits = [_fit(reading, base, logs, arm, limits=True) for reading in tried]
+    gains = [stands.fit.cost - fit.fit.cost for fit in fits]
+    suspects = [
+        Suspect(reading, fit.fit, gain, fit.closeness, fit.unexplained)
+        for reading, fit, gain in zip(tried, fits, gains, strict=True)
+        if gain > _MIN_REFIT_GAIN
+    ]
     return stands, sorted(suspects, key=lambda s: -s.gain)
 
 
-def _read(
-    reading: Reading,
-    base: EquationError,
-    logs: Sequence[Log],
-    arm: Arm,
-    low: NDArray[np.float64],
-    high: NDArray[np.float64],
-) -> Fit:
-    """Return the fit to logs and arm file that are corrected for the one defect that a reading supposes, such as a reversed sign."""
+def _fit(reading: Reading, base: EquationError, logs: Sequence[Log], arm: Arm, *, limits: bool = False) -> Delivered:
+    """Return the fit to logs and arm file that are corrected for the one defect that a reading supposes, such as a reversed sign.
+
+    `base` is the equation error of the logs as they stand; with `limits` drives may deliver less than they are commanded.
+    """
+    low, high = bounds(arm)
     if reading.corrections.gravity is not None:
         weights = arm.gravity_parameters
-        low, high = low.copy(), high.copy()
         if reading.corrections.gravity == "reversed":
             low[weights], high[weights] = -high[weights], -low[weights]
         else:
             low[weights] = high[weights] = 0.0
-        return base.fit(low, high)
-    read = [Rows.of(reading.corrections.on_log(log), arm) for log in logs]
-    return EquationError(read, arm, base.scale).fit(low, high)
+    read = [reading.corrections.on_log(log) for log in logs]
+    if limits:
+        return delivered(read, arm, low, high, stands=base)
+    if reading.corrections.gravity is not None:
+        return as_commanded(base, low, high)
+    return as_commanded(EquationError([Rows.of(log, arm) for log in read], arm, base.scale), low, high)
 
 
 def confirm(
@@ -214,7 +271,7 @@ def confirm(
     """
     if not suspects:
         return None
-    as_is = Refit.of(arm, training, holdout, horizon)
+    as_is = Refit.within_limits(arm, training, holdout, horizon)
     possible = as_is.possible(arm)
     # If the arm hardly moves, predictions of the log as it stands may miss by many times the motion; that confirms no other reading.
     no_worse_than_rest = as_is.bounded_by_motion()
@@ -222,8 +279,8 @@ def confirm(
     for suspect in suspects[:_MOST_SUSPECTS]:
         corrections = suspect.reading.corrections
         read = [[corrections.on_log(log) for log in group] for group in (training, holdout)]
-        refit = Refit.of(corrections.on_arm(arm), read[0], read[1], horizon)
-        explains = refit.relative < EXPLAINS or (refit.relative < 1.0 and suspect.fit.share.max() < _ACCOUNTS_FOR)
+        refit = Refit.within_limits(corrections.on_arm(arm), read[0], read[1], horizon)
+        explains = refit.relative < EXPLAINS or (refit.relative < 1.0 and suspect.unexplained.max() < _ACCOUNTS_FOR)
         if refit.possible(corrections.on_arm(arm)) and explains:
             ratio = refit.against(no_worse_than_rest, rescaled=bool(corrections.unit))
             says = suspect.gain - math.log(ratio)

@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armgap.arm.arm import Arm
+from armgap.arm.corrections import Corrections
 from armgap.check.check import Check
+from armgap.check.drive_limit import deliver, delivered
 from armgap.check.equation_error import EquationError, Rows, bounds
 from armgap.log.log import Log
 
@@ -25,18 +27,36 @@ _MISFIT_RATIO = 25.0
 _SHARE = 0.1
 # Largest time [s] between the beginnings of stretches of constant torque that are judged together, by rows outside of all stretches.
 _TOGETHER_S = 16.0
+# Largest part of a log in stretches of constant torque without which the limits of the drives are estimated.
+_MOST_CONSTANT = 0.5
 # Smallest number of rows of the equation of motion, inside and outside of a stretch, by which the stretch is judged.
 _MIN_STRETCH_ROWS = 30
 
 
 def find(logs: Sequence[Log], arm: Arm) -> list[Check]:
     """Return one check per stretch of a log whose torque was not recorded."""
+    runs = [[(j, first, last) for j in range(log.n_joints) for first, last in _constant(log, j)] for log in logs]
+    if not any(runs):
+        return []
+    levels = delivered([_without(log, of_log) for log, of_log in zip(logs, runs, strict=True)], arm).levels
     checks = []
-    for log in logs:
-        runs = [(j, first, last) for j in range(log.n_joints) for first, last in _constant(log, j)]
-        for near in _neighbours(log, runs):
-            checks += _judged(log, arm, runs, near)
+    for log, acting, of_log in zip(logs, deliver(logs, levels), runs, strict=True):
+        for near in _neighbours(log, of_log):
+            checks += _judged(log, Rows.of(acting, arm, around=_around(near)), arm, of_log, near)
     return checks
+
+
+def _without(log: Log, runs: list[Run]) -> Log:
+    """Return a log without the samples of stretches of constant torque; the log itself where they are most of it."""
+    constant = sum(last - first + 1 for _, first, last in runs)
+    if not 0 < constant < _MOST_CONSTANT * len(log):
+        return log
+    return Corrections(skip=tuple(f"{log.t[first]:.9g}-{log.t[last]:.9g}" for _, first, last in runs)).on_log(log)
+
+
+def _around(near: list[Run]) -> tuple[int, int]:
+    """Return the first and last sample of runs that are judged together."""
+    return near[0][1], max(last for _, _, last in near)
 
 
 def _neighbours(log: Log, runs: list[Run]) -> Iterator[list[Run]]:
@@ -66,9 +86,8 @@ def _constant(log: Log, j: int) -> list[tuple[int, int]]:
     return list(zip(first[long].tolist(), last[long].tolist(), strict=True))
 
 
-def _judged(log: Log, arm: Arm, runs: list[Run], near: list[Run]) -> list[Check]:
-    """Return checks of those runs in `near` whose residual of the equation of motion is much larger than in rows nearby, outside of all `runs`."""
-    rows = Rows.of(log, arm, around=(near[0][1], max(last for _, _, last in near)))
+def _judged(log: Log, rows: Rows, arm: Arm, runs: list[Run], near: list[Run]) -> list[Check]:
+    """Return checks of those runs in `near` whose residual of the equation of motion (`rows`) is much larger than nearby, outside of all `runs`."""
     dead = np.zeros((len(rows.y), log.n_joints), dtype=bool)
     alive = np.ones(len(rows.y), dtype=bool)
     when = log.t[rows.samples]

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,6 +25,8 @@ Array = NDArray[np.float64]
 
 # Cut-off of the filters [rad/s]: above the motion of arms (a few hertz), below the noise of encoders; at 2.5 ms it is 0.075 of the sample rate.
 CUTOFF = 30.0
+# Native description of an axis, as a filter of torques.
+_AXIS = {"kind": "axis", "gravity": 0.0, "theta": [1.0, 0.0, 0.0, 0.0], "sigma": [1.0] * 4}
 # Largest cut-off of the filters, in parts of the sample rate; it bounds the cut-off for slowly sampled logs.
 _LARGEST_CUTOFF = 0.5
 # Time constants of the filters that pass before a row is used, after the start and after a hole in the samples.
@@ -71,10 +74,7 @@ class Rows:
 
         `cutoff` is the cut-off of the filters [rad/s].
         """
-        begin, end = around or ((len(log) - _LARGEST_LOG) // 2, (len(log) + _LARGEST_LOG) // 2)
-        beside = max(round(_BESIDE_S / float(np.median(np.diff(log.t)))), end - begin) if around else 0
-        first = max(0, begin - beside)
-        part = slice(first, end + beside + 1)
+        part = _part(log, around)
         t, q, tau = (np.ascontiguousarray(x[part]) for x in (log.t, log.q, log.tau))
         steps = np.diff(t)
         period = float(np.median(steps))
@@ -83,7 +83,25 @@ class Rows:
         settled = _settled(t, _HOLE_PERIODS * period, _SETTLING / cutoff)
         settled &= np.isfinite(y).all(axis=1)
         rows = np.flatnonzero(settled)
-        return cls(psi[rows], y[rows], rows + first)
+        return cls(psi[rows], y[rows], rows + part.start)
+
+    def with_torque(self, log: Log, joint: int, torque: Array) -> Rows:
+        """Return the rows of a log (`Rows.of`, default cut-off) with other torques of one joint (from 0), given at all samples [N m or N]."""
+        part = _part(log, None)
+        t, tau = (np.ascontiguousarray(x[part]) for x in (log.t, torque))
+        cutoff = min(CUTOFF, _LARGEST_CUTOFF / float(np.median(np.diff(t))))
+        # The right sides of the rows of any arm are filtered torques; an axis has the cheapest left sides.
+        _, filtered = _native.regression_rows(_AXIS, t, np.zeros((len(t), 1)), tau[:, None], cutoff)
+        y = self.y.copy()
+        y[:, joint] = filtered[self.samples - part.start, 0]
+        return replace(self, y=y)
+
+
+def _part(log: Log, around: tuple[int, int] | None) -> slice:
+    """Return the part of a log that rows are made from: its middle, or the samples `around` and some seconds on either side."""
+    begin, end = around or ((len(log) - _LARGEST_LOG) // 2, (len(log) + _LARGEST_LOG) // 2)
+    beside = max(round(_BESIDE_S / float(np.median(np.diff(log.t)))), end - begin) if around else 0
+    return slice(max(0, begin - beside), end + beside + 1)
 
 
 def _settled(t: Array, hole: float, wait: float) -> NDArray[np.bool_]:
@@ -122,15 +140,20 @@ class Fit:
 
 
 class EquationError:
-    """Normal equations of several logs, joint by joint, and their solution by bounded least squares."""
+    """Normal equations of several logs, joint by joint, and their solution by bounded least squares.
 
-    def __init__(self, rows: Sequence[Rows], arm: Arm, scale: Array | None = None) -> None:
+    Unexplained torques are relative to `scale`, or else to the torque and the largest term of the equation of motion (`terms`), whichever is larger:
+    mean squares per joint, shape (n_joints,). Another reading of a log takes these from the log as it stands, so that the readings are comparable.
+    """
+
+    def __init__(self, rows: Sequence[Rows], arm: Arm, scale: Array | None = None, terms: Array | None = None) -> None:
         self.arm = arm
         self.rows = tuple(rows)
         self.count = sum(len(r.y) for r in rows)
         self.gram = sum(np.einsum("kji,kjl->jil", r.psi, r.psi, optimize=True) for r in rows) / max(self.count, 1)
         self.moment, self.square = self._moments([r.y for r in rows])
-        self.scale = self._scale() if scale is None else scale
+        self.terms = self._terms() if terms is None else terms
+        self.scale: Array = np.maximum(np.maximum(self.square, self.terms), 1e-30) if scale is None else scale
 
     def _moments(self, torques: Sequence[Array]) -> tuple[Array, Array]:
         """Return per joint the products of the regressor with the torques, and the mean squares of the torques."""
@@ -139,14 +162,13 @@ class EquationError:
         square = sum(np.sum(y**2, axis=0) for y in torques) / max(self.count, 1)
         return np.asarray(moment), np.asarray(square)
 
-    def _scale(self) -> Array:
-        """Mean square per joint of the torque, or of the largest term of the equation of motion with the arm file's parameters.
+    def _terms(self) -> Array:
+        """Mean square per joint of the largest term of the equation of motion with the arm file's parameters.
 
         Inertia and weight cancel near a resonance, where the torque alone would be a small measure.
         """
-        terms = (np.diagonal(self.gram, axis1=1, axis2=2) * self.arm.theta**2).max(axis=1)
-        scale: Array = np.maximum(np.maximum(self.square, terms), 1e-30)
-        return scale
+        terms: Array = (np.diagonal(self.gram, axis1=1, axis2=2) * self.arm.theta**2).max(axis=1)
+        return terms
 
     def fit(self, low: Array, high: Array, torques: Sequence[Array] | None = None) -> Fit:
         """Return the bounded least-squares fit, parameters between `low` and `high`, to the logs' torques or to `torques` in their place."""
@@ -172,6 +194,14 @@ class EquationError:
         )
         left = square - 2.0 * moment @ theta + np.einsum("i,jil,l->j", theta, self.gram, theta)
         return Fit(theta, np.maximum(left, 0.0) / scale)
+
+    def with_rows(self, rows: Sequence[Rows]) -> EquationError:
+        """Return the equation error of rows that differ in the torques alone."""
+        other = copy(self)
+        other.rows = tuple(rows)
+        other.moment, other.square = self._moments([r.y for r in rows])
+        other.scale = np.maximum(np.maximum(other.square, other.terms), 1e-30)
+        return other
 
     def noise_square(self, logs: Sequence[Log]) -> Array:
         """Return per joint the mean square of the torque that noise of the positions leaves unexplained, by the arm file's parameters.

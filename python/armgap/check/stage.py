@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from armgap.arm.arm import Arm
 from armgap.arm.corrections import Corrections
-from armgap.check import dead_stretch, time_shift, torque_is_position, torque_unit
+from armgap.check import dead_stretch, drive_limit, time_shift, torque_is_position, torque_unit
 from armgap.check.check import Check
 from armgap.check.contradiction import AS_GOOD, BETTER, EXPLAINS, Found, Refit, Suspect, confirm, screen
 from armgap.check.elastic import beside_elasticity
@@ -35,9 +35,6 @@ _FEWEST_ROWS = 100
 # where an effect is hidden.
 _UNRELATED = (0.5, 0.25)
 _UNPREDICTED = (0.3, 0.4)
-# A joint is driven if its torque's mean square exceeds this part of that of the largest term of its equation of motion; a joint that is
-# not driven, as the passive joint of an acrobot, has no torque to be explained.
-_DRIVEN = 0.1
 # Shifts of the torques [samples] that are tried first: torques and positions that predict well with one of them belong to the same motion.
 _SHIFTS = (-8, -5, -2, 2, 5, 8)
 
@@ -111,14 +108,14 @@ def _reading(now: Examined, horizon: float, repair: bool) -> Examined:
         return now
     stands, suspects = screen(base, logs, now.arm)
     factors = torque_unit.find(base, logs, now.arm)
-    if factors is not None and _prefers(factors, suspects, base, now, horizon):
+    if factors is not None and _prefers(factors, suspects, now, horizon):
         applied = factors.corrections if repair and factors.checks[0].severity == "repaired" else Corrections()
         said = [c if c.severity != "repaired" or repair else replace(c, severity="warning") for c in factors.checks]
         return _applied(replace(now, arm=_doubted(now.arm, factors)), applied, said)
-    odd = stands.share.max() >= _UNRELATED[0]
-    elastic = _beside_elasticity(base, logs, now.arm) if suspects or odd else stands
+    odd = stands.fit.share.max() >= _UNRELATED[0]
+    elastic = _beside_elasticity(stands.errors, logs, now.arm) if suspects or odd else stands.fit
     suspects = [s for s in suspects if s.fit.cost < elastic.cost + _CLOSE_COST_DIFFERENCE]
-    found = confirm(stands, suspects, now.training, now.holdout, now.arm, horizon)
+    found = confirm(stands.fit, suspects, now.training, now.holdout, now.arm, horizon)
     if found is None:
         return _applied(now, Corrections(), _strangers(elastic.share, now, horizon, 0))
     return _applied(now, found.reading.corrections, [_said(found, now.arm, horizon)])
@@ -152,7 +149,7 @@ def unexplained_columns(
     if len(base) < _FEWEST_ROWS:
         return []
     elastic = base.of_torques(_beside_elasticity(base, logs, arm))
-    share = np.where(base.square >= _DRIVEN * base.scale, elastic.share, 0.0)
+    share = np.where(base.square >= drive_limit.DRIVEN * base.scale, elastic.share, 0.0)
     return _strangers(share, Examined(list(training), list(holdout), arm, (), Corrections()), horizon, 1)
 
 
@@ -168,8 +165,8 @@ def _strangers(share: Array, now: Examined, horizon: float, pair: int) -> list[C
     if share[worst] < _UNRELATED[pair]:
         return []
     noise = EquationError([Rows.of(log, now.arm) for log in logs], now.arm).noise_square(logs)
-    limited, fit = torque_unit.limited(logs, now.arm, worst)
-    if (fit.share - noise / np.maximum(limited.square, np.finfo(float).tiny)).max() < torque_unit.LIMITED:
+    limited, fit = drive_limit.limited(logs, now.arm, worst)
+    if (fit.share - noise / np.maximum(limited.square, np.finfo(float).tiny)).max() < drive_limit.LIMITED:
         return []
     period = float(np.median(np.diff(logs[0].t)))
     readings = [Corrections(), *(Corrections(shift={"tau": k * period}) for k in _SHIFTS)]
@@ -201,11 +198,9 @@ def _doubted(arm: Arm, factors: torque_unit.Factors) -> Arm:
     return replace(arm, sigma=np.maximum(arm.sigma, np.abs(arm.theta) * abs(1.0 - 1.0 / factor)))
 
 
-def _prefers(
-    factors: torque_unit.Factors, suspects: Sequence[Suspect], base: EquationError, now: Examined, horizon: float
-) -> bool:
+def _prefers(factors: torque_unit.Factors, suspects: Sequence[Suspect], now: Examined, horizon: float) -> bool:
     """Return whether factors on torques explain the logs better than any other reading; predictions decide between similar ones."""
-    rivals = [s for s in suspects if base.of_torques(s.fit).closeness < factors.closeness + _CLOSE_COST_DIFFERENCE]
+    rivals = [s for s in suspects if s.closeness < factors.closeness + _CLOSE_COST_DIFFERENCE]
     if not rivals and not factors.doubtful:
         return True
     with_factors = _predicted(factors.corrections, now, horizon)
@@ -223,7 +218,7 @@ def _confirmed(read: Refit, now: Examined, horizon: float, limit: float) -> bool
 
 def _predicted(corrections: Corrections, now: Examined, horizon: float) -> Refit:
     read = [[corrections.on_log(log) for log in group] for group in (now.training, now.holdout)]
-    return Refit.of(corrections.on_arm(now.arm), read[0], read[1], horizon)
+    return Refit.within_limits(corrections.on_arm(now.arm), read[0], read[1], horizon)
 
 
 def _said(found: Found, arm: Arm, horizon: float) -> Check:

@@ -7,8 +7,8 @@ parameters, so only a factor of another order of magnitude is a unit; a smaller 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,17 +17,13 @@ from numpy.typing import NDArray
 from armgap.arm.arm import Arm
 from armgap.arm.corrections import Corrections
 from armgap.check.check import Check, Severity
+from armgap.check.drive_limit import LIMITED, PARAMETER_BOUND_FACTOR, TAKEN, TRIED, at_limits, limited
 from armgap.check.elastic import beside_elasticity
-from armgap.check.equation_error import EquationError, Fit, Rows, bounds
+from armgap.check.equation_error import EquationError, bounds
 from armgap.log.log import Log
 from armgap.several_joints import by_joint
 
-__all__ = ["LIMITED", "Factors", "find", "limited", "refined", "said"]
-
-# Share of unexplained torque below which a limit of the drive explains a joint. Drives that are limited leave 0.03 at most, torques in reversed time
-# order 0.31 and more at their best limit of size or rate (four development cases each).
-LIMITED = 0.2
-
+__all__ = ["Factors", "find", "refined", "said"]
 
 # Range of factors on a torque that are a gain of the drive (an effect), or wrong parameters: from the inverse to this factor.
 _GAIN = 2.0
@@ -37,8 +33,6 @@ _SCALED = 4.0
 _MAX_REPAIRED_FACTOR = 2e3
 # Columns share a factor if their factors differ by less than this ratio.
 _COMMON_FACTOR_RATIO = 1.5
-# Parameters may differ from the arm file by this factor while a column's factor is estimated.
-_PARAMETER_BOUND_FACTOR = 2.0
 # Iterations in which factors and parameters are estimated in turn.
 _FACTOR_ITERATIONS = 4
 # Reduction of the mean log share of unexplained torque that a factor on torques needs; with a reduction below the second number predictions have
@@ -47,23 +41,10 @@ _GAIN_IN_COST = 0.2
 _CLEAR_GAIN = 0.5
 # Share of unexplained torque above which a joint determines no factor: noise fed back by a controller, or a stop, makes most of its torque.
 _MAX_UNEXPLAINED_SHARE = 0.3
-# Where a factor leaves this share of a torque, a limit of the drive or an elastic torque is added to the model, and kept where it halves that share:
-# sound logs and factors alone leave 0.02 at most, drives that saturate 0.2 to 0.6 and behind their limit 0.01 to 0.05 (five development cases of six;
-# 0.35 in one that is hardly ever below its limit), springs and stops 0.1 to 0.4 and less than 0.03 with the elastic torque (three of five). Where
-# that share stays, predictions have to agree: friction without bound and another size of all torques have left 0.14 to 0.25 of two runs of a real arm
-# whose torques were in newton metres.
-_CHANGE_TRIED = 0.1
-_CHANGE_TAKEN = 0.5
 # Standard deviations of the arm file beyond which friction is not that of the arm file.
 _SURE = 3.0
 # Share of unexplained torque below which a factor is exact: remaining errors are those of the arm file's parameters.
 _EXACT_FACTOR_SHARE = 1e-3
-# Quantiles of a torque's size at which a drive's limit is tried: a limit between two quantiles still explains what no factor does.
-_LIMIT_QUANTILES = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95)
-# Times [s] that a drive with a limited rate of torque may need for the range of its commands, each a quarter longer than the one before: the shortest
-# shows in no log, the longest leaves a constant torque. A rate between two of them is met to 12 %, which leaves far less torque unexplained than
-# columns of another arm do.
-_SLEW_TIMES = tuple(0.05 * 1.25**k for k in range(25))
 
 
 @dataclass(frozen=True)
@@ -90,7 +71,7 @@ class Factors:
 
 def find(base: EquationError, logs: Sequence[Log], arm: Arm) -> Factors | None:
     """Return the factors that scale torque columns of the logs (`base`) to the arm file, or None; saturation of a drive is no factor."""
-    low, high = bounds(arm, _PARAMETER_BOUND_FACTOR)
+    low, high = bounds(arm, PARAMETER_BOUND_FACTOR)
     read = _read(base, logs, arm)
     base, factors = read.errors, read.factors
     known = read.share < _MAX_UNEXPLAINED_SHARE
@@ -114,7 +95,7 @@ def find(base: EquationError, logs: Sequence[Log], arm: Arm) -> Factors | None:
     if min(limited(logs, arm, j)[1].closeness for j in odd) < fit.closeness:
         return None
     corrections, checks = _said(applied, odd, shared)
-    doubtful = float(fit.share.max()) > _CHANGE_TRIED or gain < _CLEAR_GAIN
+    doubtful = float(fit.share.max()) > TRIED or gain < _CLEAR_GAIN
     return Factors(corrections, fit.closeness, tuple(checks), doubtful)
 
 
@@ -136,16 +117,6 @@ def _common(factors: NDArray[np.float64], share: NDArray[np.float64]) -> float:
     return math.exp(float(np.average(np.log(factors), weights=weight)))
 
 
-def limited(logs: Sequence[Log], arm: Arm, joint: int) -> tuple[EquationError, Fit]:
-    """Return the equation error and the best fit with the torques of one joint limited in size or in rate.
-
-    A limit in size far below the command looks like a small factor, a limit in rate like columns of another arm.
-    """
-    low, high = bounds(arm, _PARAMETER_BOUND_FACTOR)
-    fits = ((errors, errors.of_torques(errors.fit(low, high))) for _, errors in _at_limits(logs, arm, joint))
-    return min(fits, key=lambda entry: entry[1].closeness)
-
-
 @dataclass(frozen=True)
 class _Reading:
     """Equation error, factor and unexplained share of each torque, and mask of the joints with a limit of the drive or an elastic torque."""
@@ -163,7 +134,7 @@ class _Reading:
 
     def explains(self, joint: int, before: _Reading) -> bool:
         """Whether the limit or elastic torque of a joint explains its torque: it leaves far less unexplained than the reading `before`."""
-        enough = self.share[joint] < min(LIMITED, _CHANGE_TAKEN * before.share[joint])
+        enough = self.share[joint] < min(LIMITED, TAKEN * before.share[joint])
         return bool(enough and np.all(self.factors > 0))
 
 
@@ -173,7 +144,7 @@ def _read(base: EquationError, logs: Sequence[Log], arm: Arm) -> _Reading:
     A column in another unit may be the command of a drive that is limited, or of a joint with a spring or a stop: such a joint's factor is
     identifiable only together with the limit, or with the elastic torque.
     """
-    low, high = bounds(arm, _PARAMETER_BOUND_FACTOR)
+    low, high = bounds(arm, PARAMETER_BOUND_FACTOR)
 
     def model(errors: EquationError) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         factors = _factors(errors, low, high)
@@ -184,51 +155,17 @@ def _read(base: EquationError, logs: Sequence[Log], arm: Arm) -> _Reading:
         return now
     for joint in range(arm.n_joints):
         # A joint that was not driven has no factor.
-        if now.share[joint] < _CHANGE_TRIED or now.factors[joint] <= 0:
+        if now.share[joint] < TRIED or now.factors[joint] <= 0:
             continue
         changed = now.changed | (np.arange(arm.n_joints) == joint)
-        at_limits = [(delivered, _Reading.of(e, low, high, changed)) for delivered, e in _at_limits(logs, arm, joint)]
-        delivered, best = min(at_limits, key=lambda entry: float(entry[1].share[joint]))
+        limits = [(there, _Reading.of(e, low, high, changed)) for there, e in at_limits(logs, arm, joint)]
+        delivered, best = min(limits, key=lambda entry: float(entry[1].share[joint]))
         if best.explains(joint, now):
             logs, now = delivered, best
             continue
         beside = _Reading.of(beside_elasticity(now.errors, logs, model, [joint]), low, high, changed)
         now = beside if beside.explains(joint, now) else now
     return now
-
-
-def _at_limits(logs: Sequence[Log], arm: Arm, joint: int) -> Iterator[tuple[list[Log], EquationError]]:
-    """Yield the logs with one joint's torques limited in size or in rate, and their equation error, for each limit that is tried."""
-    tau = [log.tau[:, joint] for log in logs]
-    sizes = np.quantile(np.abs(np.concatenate(tau)), _LIMIT_QUANTILES)
-    rates = max(float(np.ptp(x)) for x in tau) / np.array(_SLEW_TIMES)
-    for size in sizes:
-        yield _delivered(logs, arm, joint, [np.clip(x, -size, size) for x in tau])
-    for rate in rates:
-        yield _delivered(logs, arm, joint, [_slewed(log.t, x, rate) for log, x in zip(logs, tau, strict=True)])
-
-
-def _slewed(t: NDArray[np.float64], tau: NDArray[np.float64], rate: float) -> NDArray[np.float64]:
-    """Return torques that follow their commands at a rate of at most `rate` [N m/s or N/s], from the first command on."""
-    steps, commands = (rate * np.diff(t)).tolist(), tau.tolist()
-    now = commands[0]
-    slewed = [now]
-    for step, command in zip(steps, commands[1:], strict=True):
-        now = min(max(command, now - step), now + step)
-        slewed.append(now)
-    return np.array(slewed)
-
-
-def _delivered(
-    logs: Sequence[Log], arm: Arm, joint: int, torques: Sequence[NDArray[np.float64]]
-) -> tuple[list[Log], EquationError]:
-    """Return the logs with other torques of one joint, and their equation error."""
-    there = []
-    for log, delivered in zip(logs, torques, strict=True):
-        tau = log.tau.copy()
-        tau[:, joint] = delivered
-        there.append(replace(log, tau=tau))
-    return there, EquationError([Rows.of(log, arm) for log in there], arm)
 
 
 def _within(factor: float, bound: float) -> bool:

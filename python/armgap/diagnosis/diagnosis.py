@@ -17,6 +17,7 @@ from armgap.arm.arm import Arm
 from armgap.arm.corrections import Corrections
 from armgap.check import torque_unit
 from armgap.check.check import Check
+from armgap.check.contradiction import start_beside_file
 from armgap.check.stage import unexplained_columns
 from armgap.check.time_shift import causal, early, explains_better, taken_back
 from armgap.diagnosis.custom_effect import CustomEffect, TorqueTables, check_effects
@@ -145,7 +146,10 @@ def _diagnose(given: PreparedInput, settings: dict[str, Any], effects: Sequence[
         # No effect is fitted to contradictory input: the gap is that of the arm with re-estimated parameters.
         settings = settings | {"max_causes": 0}
     tables = TorqueTables.of(effects, training, held)
-    settings = settings | {"own": [e.joint - 1 for e in effects]}
+    settings = settings | {
+        "own": [e.joint - 1 for e in effects],
+        "start": start_beside_file(training, arm) if arm.chain is None else None,
+    }
     if arm.chain is not None:
         changed, notes = serial_settings(given.checks)
         settings, given = settings | changed, replace(given, notes=(*given.notes, *notes))

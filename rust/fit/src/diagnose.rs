@@ -128,10 +128,23 @@ impl Request<'_> {
         let noise = std::array::from_fn(|j| {
             crate::log::track::median(training.data.tracks.iter().map(|t| t.noise[j]).collect())
         });
+        let start = self.options.start.as_deref().map(<[f64; P]>::try_from).transpose();
+        let start = start.map_err(|_| DiagnoseError::Parameters(self.arm.kind))?;
         let progress = ProgressReporter::new(Observer::clone(self.observer));
         let custom_effects = self.custom_effects(&scales);
         let sides = std::array::from_fn(|j| self.arm.sides(j));
-        Ok(DiagnosisContext { arm, prior, scales, training, holdout, noise, sides, custom_effects, progress })
+        Ok(DiagnosisContext {
+            arm,
+            prior,
+            start,
+            scales,
+            training,
+            holdout,
+            noise,
+            sides,
+            custom_effects,
+            progress,
+        })
     }
 
     /// The custom effects of the options, each with its parameter at the initial guess.

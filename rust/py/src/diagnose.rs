@@ -108,6 +108,9 @@ pub fn diagnose(
     if let Some(value) = options.get_item("own")? {
         chosen.custom_effects = value.extract()?;
     }
+    if let Some(value) = options.get_item("start")? {
+        chosen.start = value.extract()?;
+    }
     if let Some(value) = options.get_item("seed")? {
         chosen.seed = value.extract()?;
     }

@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 # Rounding error as a part of the torque's RMS variation from which quantisation is reported: as large as many an effect.
 _MATTERS = 0.015
-# Number of levels below which a torque counts as a command with levels by design, not as quantised.
+# Number of levels below which a torque counts as a command with levels by design, not as quantised, unless it leaves them soon and by one step.
 _MIN_QUANTIZED_LEVELS = 8
 # Changes of a torque's level that the check of quantisation needs.
 _CHANGES = 40
@@ -48,14 +48,13 @@ def look(log: Log, arm: Arm | None) -> Outcome:
 
 def _rounded(tau: Array, step: float) -> bool:
     """Whether a torque passes through its levels as a rounded continuous signal does."""
-    if len(np.unique(np.round(tau / step))) < _MIN_QUANTIZED_LEVELS:
-        return False
     moved = np.diff(tau)
     at = np.flatnonzero(np.abs(moved) > 0.5 * step)
     if len(at) < _CHANGES:
         return False
     stays = np.diff(at)
-    if float(np.median(stays)) < _MEDIAN_STAY_ROWS:
-        return True
-    single = float(np.mean(np.abs(moved[at]) < 1.5 * step))
-    return single > _ONE_STEP and float(np.std(stays) / np.mean(stays)) > _EQUALLY_LONG
+    brief = float(np.median(stays)) < _MEDIAN_STAY_ROWS
+    single = float(np.mean(np.abs(moved[at]) < 1.5 * step)) > _ONE_STEP
+    if len(np.unique(np.round(tau / step))) < _MIN_QUANTIZED_LEVELS:
+        return brief and single
+    return brief or (single and float(np.std(stays) / np.mean(stays)) > _EQUALLY_LONG)

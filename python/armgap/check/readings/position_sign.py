@@ -1,6 +1,6 @@
 """`position_sign`: positions of one joint, or positions and torques of the joint, have reversed sign.
 
-For an arm of one joint `position_sign` is equivalent to `torque_sign`.
+For an arm of one joint `position_sign` is equivalent to `torque_sign`, but for an axis that carries weight.
 """
 
 from __future__ import annotations
@@ -9,13 +9,19 @@ from collections.abc import Iterator
 
 from armgap.arm.arm import Arm
 from armgap.arm.corrections import Corrections
-from armgap.check.readings.reading import Reading, reading
+from armgap.check.readings.reading import Reading, reading, weighs_constantly
 
 __all__ = ["readings"]
 
 
 def readings(arm: Arm, _travel: float) -> Iterator[Reading]:
-    """Yield readings with reversed positions, and with reversed positions and torques, for each joint of an arm of several joints."""
+    """Yield readings with reversed positions, and with reversed positions and torques, for each joint of an arm of several joints.
+
+    Of an axis that carries weight a reading with reversed positions.
+    """
+    if weighs_constantly(arm):
+        others = Corrections(flip=("tau1",), gravity="reversed")
+        yield reading("position_sign", "positions counted the other way", Corrections(flip=("q1",)), others, joint=1)
     if arm.n_joints == 1:
         return
     joints = range(1, arm.n_joints + 1)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from armgap.arm.arm import Arm
 from armgap.arm.corrections import Corrections
 from armgap.check.check import CheckName
 
-__all__ = ["Reading", "reading"]
+__all__ = ["Reading", "reading", "weighs_constantly"]
 
 
 @dataclass(frozen=True)
@@ -33,6 +34,15 @@ class Reading:
     corrections: Corrections
     remedies: tuple[str, ...]
     joint: int | None = None
+
+
+def weighs_constantly(arm: Arm) -> bool:
+    """Whether gravity acts on an axis with a force that its position does not change.
+
+    The equation of motion of all other arms is odd in ``(q, tau)``, so that reversed positions are equivalent to reversed torques. For such an axis
+    reversed positions are equivalent to reversed torques and reversed gravity.
+    """
+    return arm.chain is None and not arm.rotary and bool(arm.theta[arm.gravity_parameters].any())
 
 
 def reading(

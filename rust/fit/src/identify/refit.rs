@@ -1,17 +1,14 @@
 //! The arm's parameters re-estimated without any effect, under the arm file's standard deviations as prior.
 //!
-//! The plausibility checks of the input compare a log as it stands with the log after correction of a defect. The scale of the residual is estimated
-//! with the parameters, so the cost has several minima: where the parameters predict the logs badly, the scale of the residual is large, the prior
-//! outweighs the residual, and the parameters hardly move. So the fit also starts from parameters that a linear regression finds, as an arm with an
-//! unknown load or a wrong arm file requires.
+//! The plausibility checks of the input compare a log as it stands with the log after correction of a defect. The fit also starts from parameters that a
+//! linear regression finds (`DiagnosisContext::settle_rigid`), as an arm with an unknown load or a wrong arm file requires.
 
 use crate::diagnose::Request;
-use crate::likelihood::context::WindowSet;
 use crate::log::input::{DiagnoseError, LogData, Options, validate};
 use crate::model::arm::{ArmDescription, WithArm};
 use crate::model::hypothesis::Hypothesis;
+use crate::numeric::products::rms;
 use crate::progress::{Observer, guarded};
-use crate::result::gap::rms;
 use armgap_core::arm::Arm;
 
 /// Re-estimated parameters of an arm without effects, with prediction errors on the holdout.
@@ -44,15 +41,13 @@ pub fn refit(
     observer: &Observer,
 ) -> Result<Refit, DiagnoseError> {
     validate(arm.kind.joints(), training, holdout, options)?;
-    let work = RigidFit { request: Request { arm, training, holdout, options, observer }, start };
+    let options = Options { start: Some(start.to_vec()), ..options.clone() };
+    let work = RigidFit(Request { arm, training, holdout, options: &options, observer });
     let ended = guarded(|| arm.dispatch(work)).ok_or(DiagnoseError::Stopped)?;
     ended.ok_or(DiagnoseError::Parameters(arm.kind))?
 }
 
-struct RigidFit<'a> {
-    request: Request<'a>,
-    start: &'a [f64],
-}
+struct RigidFit<'a>(Request<'a>);
 
 impl WithArm for RigidFit<'_> {
     type Output = Result<Refit, DiagnoseError>;
@@ -62,33 +57,15 @@ impl WithArm for RigidFit<'_> {
         arm: A,
         theta: [f64; P],
     ) -> Self::Output {
-        let Self { request, start } = self;
-        let start: [f64; P] = start.try_into().map_err(|_| DiagnoseError::Parameters(request.arm.kind))?;
+        let Self(request) = self;
         let context = request.context::<A, N, P>(arm, theta, request.training, request.holdout)?;
-        let nominal = Hypothesis::rigid(theta);
-        let missed = |sample: &WindowSet<N>, hypothesis: &Hypothesis<P>| {
-            rms::<N>(
-                &sample.measured,
-                &sample.data.predict(&context.arm, hypothesis, &sample.data.zero_offsets()),
-            )
-        };
-        let fitted = |from: &Hypothesis<P>| {
-            let (fit, _) = context.settle(from, context.rough_scale(from));
-            let left: f64 = missed(&context.training, &fit.hypothesis).iter().map(|error| error.ln()).sum();
-            (fit, left)
-        };
-        let (mut fit, left) = fitted(&nominal);
-        if start != theta {
-            let (other, less) = fitted(&Hypothesis::rigid(start));
-            if less < left {
-                fit = other;
-            }
-        }
+        let (_, fit) = context.settle_rigid();
+        let missed = |hypothesis: &Hypothesis<P>| context.holdout.errors(&context.arm, hypothesis);
         Ok(Refit {
             theta: fit.hypothesis.theta.to_vec(),
             sigma: (0..P).map(|i| fit.sigma(i)).collect(),
-            before: missed(&context.holdout, &nominal),
-            refit: missed(&context.holdout, &fit.hypothesis),
+            before: missed(&Hypothesis::rigid(theta)),
+            refit: missed(&fit.hypothesis),
             motion: rms::<N>(&context.holdout.measured, &context.holdout.still()),
         })
     }

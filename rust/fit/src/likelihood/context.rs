@@ -5,6 +5,7 @@ use crate::likelihood::scale::Scales;
 use crate::likelihood::solve::{Effort, Fit, FitProblem, Prior};
 use crate::likelihood::weighting::{Gram, Weighting, initial_state_sensitivities};
 use crate::model::hypothesis::{EffectInstance, Hypothesis};
+use crate::numeric::products::rms;
 use crate::predict::window::{Dataset, InitialStateOffset, Window};
 use crate::progress::{Phase, ProgressReporter};
 use armgap_core::arm::Arm;
@@ -29,6 +30,8 @@ pub struct DiagnosisContext<A, const N: usize, const P: usize> {
     pub arm: A,
     /// Prior of the arm's parameters.
     pub prior: Prior<P>,
+    /// Parameters from which the arm without effects is fitted too, besides those of the prior, SI.
+    pub start: Option<[f64; P]>,
     /// Typical sizes of torques, speeds, positions and inertias on this arm and its logs.
     pub scales: Scales<N>,
     /// Windows of the training logs, to which hypotheses are fitted.
@@ -58,6 +61,16 @@ impl<const N: usize> WindowSet<N> {
     pub fn new(data: Dataset<N>) -> Self {
         let measured = data.measured();
         Self { data, measured }
+    }
+
+    /// RMS prediction error of a hypothesis by joint, from the measured initial states, rad or m.
+    pub fn errors<A: Arm<f64, N, P>, const P: usize>(&self, arm: &A, hypothesis: &Hypothesis<P>) -> Vec<f64> {
+        rms::<N>(&self.measured, &self.predict(arm, hypothesis))
+    }
+
+    /// Predictions of a hypothesis from the measured initial states, by window, sample and joint, rad or m.
+    fn predict<A: Arm<f64, N, P>, const P: usize>(&self, arm: &A, hypothesis: &Hypothesis<P>) -> Vec<f64> {
+        self.data.predict(arm, hypothesis, &self.data.zero_offsets())
     }
 
     /// Predictions of no motion: the measured initial position of each window at all its samples, by window, sample and joint.
@@ -100,6 +113,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         Self {
             arm: self.arm.clone(),
             prior: self.prior,
+            start: self.start,
             scales: self.scales.clone(),
             training: WindowSet::new(data.clone()),
             holdout: WindowSet::new(data),
@@ -264,6 +278,32 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         scale: [f64; N],
     ) -> (Fit<P>, SplitWeighting<N>) {
         self.settled(start, scale, false)
+    }
+
+    /// Fits the arm without effects from the arm file's parameters and, where there are others to start from, from these too; returns the starting point
+    /// and the fit with the smaller prediction errors on the training logs, by the geometric mean over their windows: an unmodelled effect, such as a
+    /// drive that saturates, may make most of the RMS error in a few windows.
+    ///
+    /// The scale of the residual is estimated with the parameters, so the cost has several minima: where the arm file's parameters predict the logs badly,
+    /// the scale is large, the prior outweighs the residual, and the parameters hardly move.
+    pub(crate) fn settle_rigid(&self) -> (Hypothesis<P>, Fit<P>) {
+        let fitted = |theta: [f64; P]| {
+            let from = Hypothesis::rigid(theta);
+            let (fit, _) = self.settle(&from, self.rough_scale(&from));
+            let predicted = self.training.predict(&self.arm, &fit.hypothesis);
+            let of_window =
+                |w: &Window<N>| rms::<N>(&self.training.measured[w.range()], &predicted[w.range()]);
+            let errors = self.training.data.windows.iter().flat_map(of_window);
+            let missed: f64 =
+                errors.zip(self.noise.iter().cycle()).map(|(error, noise)| error.max(*noise).ln()).sum();
+            (from, fit, missed)
+        };
+        let (from, fit, missed) = fitted(self.prior.theta);
+        let other = self.start.filter(|start| *start != self.prior.theta).map(fitted);
+        match other {
+            Some((start, better, less)) if less < missed => (start, better),
+            _ => (from, fit),
+        }
     }
 
     fn settled(

@@ -41,6 +41,9 @@ pub struct Options {
     pub known_units: bool,
     /// Joints, from 0, of the custom effects, whose torques lie in the logs' tables.
     pub custom_effects: Vec<usize>,
+    /// Parameters of the arm from which it is also fitted, SI; where the arm file's values are far off, the fit from these may have the smaller
+    /// prediction errors.
+    pub start: Option<Vec<f64>>,
 }
 
 impl Default for Options {
@@ -52,6 +55,7 @@ impl Default for Options {
             half_width: None,
             known_units: true,
             custom_effects: Vec::new(),
+            start: None,
         }
     }
 }

@@ -88,6 +88,15 @@ pub fn squares(columns: &[&[f64]]) -> Vec<f64> {
     columns.iter().map(|column| product(column, column)).collect()
 }
 
+/// RMS difference of measured and predicted positions by joint, rad or m.
+pub(crate) fn rms<const N: usize>(measured: &[f64], predicted: &[f64]) -> Vec<f64> {
+    let rows = (measured.len() / N).max(1) as f64;
+    let squares = |j: usize| -> f64 {
+        measured.iter().zip(predicted).skip(j).step_by(N).map(|(a, b)| (a - b).powi(2)).sum()
+    };
+    (0..N).map(|j| (squares(j) / rows).sqrt()).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -11,7 +11,8 @@ use crate::locate::regimes::{ResidualTorques, places, regimes};
 use crate::log::input::Options;
 use crate::model::arm::ArmDescription;
 use crate::model::hypothesis::{EffectInstance, Hypothesis};
-use crate::result::gap::{Compared, Errors, FreeRuns, gap, rms};
+use crate::numeric::products::rms;
+use crate::result::gap::{Compared, Errors, FreeRuns, gap};
 use crate::result::headline::Headline;
 use crate::result::report::{
     self, ArmSummary, Cause, CauseValue, Diagnosis, EquivalentSummary, Gap, LogSummary, Named, Noise,

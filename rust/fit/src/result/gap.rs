@@ -6,6 +6,7 @@ use crate::log::input::Options;
 use crate::log::track::Track;
 use crate::model::arm::ArmDescription;
 use crate::model::hypothesis::Hypothesis;
+use crate::numeric::products::rms;
 use crate::numeric::random::Random;
 use crate::predict::window::{Dataset, InitialStateOffset, Window};
 use crate::result::floor::floor;
@@ -87,15 +88,6 @@ impl<const N: usize> Errors<N> {
             [&self.before, &self.refit, &self.after],
         )
     }
-}
-
-/// RMS difference of measured and predicted positions by joint, rad or m.
-pub fn rms<const N: usize>(measured: &[f64], predicted: &[f64]) -> Vec<f64> {
-    let rows = (measured.len() / N).max(1) as f64;
-    let squares = |j: usize| -> f64 {
-        measured.iter().zip(predicted).skip(j).step_by(N).map(|(a, b)| (a - b).powi(2)).sum()
-    };
-    (0..N).map(|j| (squares(j) / rows).sqrt()).collect()
 }
 
 /// Gap on the holdout of the arm file as it is, with parameters re-estimated, and with the named causes.

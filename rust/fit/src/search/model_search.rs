@@ -87,8 +87,9 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     /// Attributes the gap to at most `max_causes` effects, one of which (`known`) may be given beforehand.
     pub fn attribute(&self, max_causes: usize, seed: u64, known: Option<Cause>) -> Attribution<N, P> {
         let nominal = Hypothesis::rigid(self.prior.theta);
-        let scale = self.rough_scale(&nominal);
-        let (settled, mut node) = self.first_node(&nominal, scale);
+        let start = if self.start.is_some() { self.settle_rigid().0 } else { nominal };
+        let scale = self.rough_scale(&start);
+        let (settled, mut node) = self.first_node(&start, scale);
         let refit = node.settled.clone();
         let min_relevance = min_relevance(node.relative_error());
         let threshold = self.look_closer(&mut node, settled, min_relevance, CLEAR);
@@ -128,17 +129,17 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     /// where no cause is found without such zeros; later nodes always have them.
     fn first_node(
         &self,
-        nominal: &Hypothesis<P>,
+        start: &Hypothesis<P>,
         scale: [f64; N],
     ) -> ((Fit<P>, SplitWeighting<N>), SearchNode<N, P>) {
         let with_zeros = || {
-            let settled = self.settle(nominal, scale);
+            let settled = self.settle(start, scale);
             (settled.clone(), self.node_around(settled, RELEVANT))
         };
         if !EncoderZeros::can_be_told_from(&self.training.data) {
             return with_zeros();
         }
-        let settled = self.settle_without_zeros(nominal, scale);
+        let settled = self.settle_without_zeros(start, scale);
         let node = self.node_around(settled.clone(), RELEVANT);
         let explained = self.cost_with_zeros(&settled.0, &settled.1.training);
         let least = node.field.iter().map(|(candidate, _)| candidate.training.iter().sum::<f64>());

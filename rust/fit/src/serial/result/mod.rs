@@ -5,10 +5,11 @@ pub(in crate::serial) mod controller_report;
 
 use crate::locate::regimes::Location;
 use crate::log::input::Options;
+use crate::numeric::products::rms;
 use crate::numeric::random::Random;
 use crate::predict::window::Dataset;
 use crate::progress::{Phase, ProgressReporter};
-use crate::result::gap::{HORIZONS, closed, free_run_series, limited, rms, whole, window_series};
+use crate::result::gap::{HORIZONS, closed, free_run_series, limited, whole, window_series};
 use crate::result::report::{
     ArmSummary, AtHorizon, Candidate, Cause, Diagnosis, FreeRun, FreeRunSeries, Gap, LogSummary, Named,
     Noise, OptionSummary, Parameters, Value,
