@@ -7,8 +7,9 @@ torques best.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,13 +26,16 @@ __all__ = [
     "TRIED",
     "Delivered",
     "as_commanded",
-    "at_limits",
+    "at_best_level",
+    "at_level",
+    "at_rates",
     "deliver",
     "delivered",
     "limited",
 ]
 
 Array = NDArray[np.float64]
+T = TypeVar("T")
 
 # Share of unexplained torque below which a limit of the drive explains a joint. Drives that are limited leave 0.03 at most, torques in reversed time
 # order 0.31 and more at their best limit of size or rate (four development cases each).
@@ -149,19 +153,24 @@ def _at_best_level(joint: int, logs: Sequence[Log], now: Delivered, low: Array, 
         )
         return Delivered(tried, errors, errors.fit(low, high))
 
-    grid = np.unique(_sizes([log.tau[:, joint] for log in logs]))
+    return at_best_level(at, logs, joint, lambda found: found.of_torque(joint))
+
+
+def at_best_level(at: Callable[[float], T], logs: Sequence[Log], joint: int, share: Callable[[T], float]) -> T:
+    """Return what `at` finds at the level [N m or N] of a joint's drive where `share` of it is least, by a grid of levels and golden section."""
+    grid = np.unique(np.quantile(np.abs(np.concatenate([log.tau[:, joint] for log in logs])), _LIMIT_QUANTILES))
     on_grid = [at(level) for level in grid]
-    best = int(np.argmin([found.of_torque(joint) for found in on_grid]))
+    best = int(np.argmin([share(found) for found in on_grid]))
     a, b = grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)]
     left, right = at(b - _GOLDEN * (b - a)), at(a + _GOLDEN * (b - a))
     for _ in range(_SECTIONS):
-        if left.of_torque(joint) < right.of_torque(joint):
+        if share(left) < share(right):
             b, right = a + _GOLDEN * (b - a), left
             left = at(b - _GOLDEN * (b - a))
         else:
             a, left = b - _GOLDEN * (b - a), right
             right = at(a + _GOLDEN * (b - a))
-    return min((on_grid[best], left, right), key=lambda found: found.of_torque(joint))
+    return min((on_grid[best], left, right), key=share)
 
 
 def limited(logs: Sequence[Log], arm: Arm, joint: int) -> tuple[EquationError, Fit]:
@@ -170,25 +179,34 @@ def limited(logs: Sequence[Log], arm: Arm, joint: int) -> tuple[EquationError, F
     A limit in size far below the command looks like a small factor, a limit in rate like columns of another arm.
     """
     low, high = bounds(arm, PARAMETER_BOUND_FACTOR)
-    fits = ((errors, errors.of_torques(errors.fit(low, high))) for _, errors in at_limits(logs, arm, joint))
-    return min(fits, key=lambda entry: entry[1].closeness)
+
+    def of(errors: EquationError) -> tuple[EquationError, Fit]:
+        return errors, errors.of_torques(errors.fit(low, high))
+
+    def closeness(found: tuple[EquationError, Fit]) -> float:
+        return found[1].closeness
+
+    sized = at_best_level(lambda level: of(at_level(logs, arm, joint, level)[1]), logs, joint, closeness)
+    return min((sized, *(of(errors) for _, errors in at_rates(logs, arm, joint))), key=closeness)
 
 
-def at_limits(logs: Sequence[Log], arm: Arm, joint: int) -> Iterator[tuple[list[Log], EquationError]]:
-    """Yield the logs with one joint's torques limited in size or in rate, and their equation error, for each limit that is tried."""
+def at_level(logs: Sequence[Log], arm: Arm, joint: int, level: float) -> tuple[list[Log], EquationError]:
+    """Return the logs with one joint's torques within a level [N m or N], and their equation error."""
+    return _of_joint(logs, arm, joint, [np.clip(log.tau[:, joint], -level, level) for log in logs])
+
+
+def at_rates(logs: Sequence[Log], arm: Arm, joint: int) -> Iterator[tuple[list[Log], EquationError]]:
+    """Yield the logs with one joint's torques limited in rate, and their equation error, for each rate that is tried."""
     tau = [log.tau[:, joint] for log in logs]
     rates = max(float(np.ptp(x)) for x in tau) / np.array(_SLEW_TIMES)
-    clipped = ([np.clip(x, -size, size) for x in tau] for size in _sizes(tau))
-    slewed = zip(*(_slewed(log.t, x, rates) for log, x in zip(logs, tau, strict=True)), strict=True)
-    for of_joint in (*clipped, *slewed):
-        there = [_with_torques(log, x, joint) for log, x in zip(logs, of_joint, strict=True)]
-        yield there, EquationError([Rows.of(log, arm) for log in there], arm)
+    for slewed in zip(*(_slewed(log.t, x, rates) for log, x in zip(logs, tau, strict=True)), strict=True):
+        yield _of_joint(logs, arm, joint, slewed)
 
 
-def _sizes(tau: Sequence[Array]) -> Array:
-    """Return the levels that are tried for the drive of a joint with the commands `tau` of several logs."""
-    sizes: Array = np.quantile(np.abs(np.concatenate(tau)), _LIMIT_QUANTILES)
-    return sizes
+def _of_joint(logs: Sequence[Log], arm: Arm, joint: int, torques: Sequence[Array]) -> tuple[list[Log], EquationError]:
+    """Return the logs with other torques of one joint, and their equation error."""
+    there = [_with_torques(log, x, joint) for log, x in zip(logs, torques, strict=True)]
+    return there, EquationError([Rows.of(log, arm) for log in there], arm)
 
 
 def _slewed(t: Array, tau: Array, rates: Array) -> Array:

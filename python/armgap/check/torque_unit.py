@@ -17,7 +17,16 @@ from numpy.typing import NDArray
 from armgap.arm.arm import Arm
 from armgap.arm.corrections import Corrections
 from armgap.check.check import Check, Severity
-from armgap.check.drive_limit import LIMITED, PARAMETER_BOUND_FACTOR, TAKEN, TRIED, at_limits, limited
+from armgap.check.drive_limit import (
+    LIMITED,
+    PARAMETER_BOUND_FACTOR,
+    TAKEN,
+    TRIED,
+    at_best_level,
+    at_level,
+    at_rates,
+    limited,
+)
 from armgap.check.elastic import beside_elasticity
 from armgap.check.equation_error import EquationError, bounds
 from armgap.log.log import Log
@@ -158,14 +167,33 @@ def _read(base: EquationError, logs: Sequence[Log], arm: Arm) -> _Reading:
         if now.share[joint] < TRIED or now.factors[joint] <= 0:
             continue
         changed = now.changed | (np.arange(arm.n_joints) == joint)
-        limits = [(there, _Reading.of(e, low, high, changed)) for there, e in at_limits(logs, arm, joint)]
-        delivered, best = min(limits, key=lambda entry: float(entry[1].share[joint]))
+        delivered, best = _limited(logs, arm, joint, low, high, changed)
         if best.explains(joint, now):
             logs, now = delivered, best
             continue
         beside = _Reading.of(beside_elasticity(now.errors, logs, model, [joint]), low, high, changed)
         now = beside if beside.explains(joint, now) else now
     return now
+
+
+def _limited(
+    logs: Sequence[Log],
+    arm: Arm,
+    joint: int,
+    low: NDArray[np.float64],
+    high: NDArray[np.float64],
+    changed: NDArray[np.bool_],
+) -> tuple[list[Log], _Reading]:
+    """Return the logs with one joint's torques limited in size or in rate so that factors leave least of them unexplained, and the factors."""
+
+    def tried(limit: tuple[list[Log], EquationError]) -> tuple[list[Log], _Reading]:
+        return limit[0], _Reading.of(limit[1], low, high, changed)
+
+    def share(found: tuple[list[Log], _Reading]) -> float:
+        return float(found[1].share[joint])
+
+    sized = at_best_level(lambda level: tried(at_level(logs, arm, joint, level)), logs, joint, share)
+    return min((sized, *map(tried, at_rates(logs, arm, joint))), key=share)
 
 
 def _within(factor: float, bound: float) -> bool:
