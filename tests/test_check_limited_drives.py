@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from armgap import Arm, Log, simulate
-from armgap.check import Check, Corrections, drive_limit, examine
+from armgap.check import Check, Corrections, dead_stretch, drive_limit, examine
 from armgap.check.contradiction import screen
 from armgap.check.equation_error import EquationError, Rows, bounds
 from armgap.simulation import Effect
@@ -121,3 +121,21 @@ def test_the_torque_that_noise_leaves_is_that_of_the_noise(arm: Arm) -> None:
     left = np.mean(((rows[1].psi - rows[0].psi) @ arm.theta) ** 2, axis=0)
     found = EquationError(rows[1:], arm).noise_square([noisy])
     np.testing.assert_allclose(found, left, rtol=0.3)
+
+
+def test_dead_stretches_of_both_joints_beside_a_drive_that_saturates(arm: Arm) -> None:
+    logs = carried(arm, Effect("torque_saturation", 2, {"level": 0.6}), scale=3.0)
+    dead = []
+    for log in logs:
+        tau = log.tau.copy()
+        tau[800:1500] = 0.0
+        dead.append(replace(log, tau=tau))
+    assert [(c.check, c.severity) for c in dead_stretch.find(dead, arm)] == [("dead_stretch", "error")] * 2
+    assert len(dead_stretch.without_constant(dead[0])) == len(dead[0]) - 700
+
+
+def test_no_drive_has_a_level_of_zero(arm: Arm) -> None:
+    [log, _] = carried(arm)
+    seldom = replace(log, tau=np.where(np.arange(len(log))[:, None] % 10 < 3, log.tau, 0.0))
+    assert np.all(drive_limit.delivered([seldom], arm).levels > 0)
+    assert np.isinf(drive_limit.delivered([replace(log, tau=np.zeros_like(log.tau))], arm).levels).all()

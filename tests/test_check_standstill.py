@@ -87,3 +87,20 @@ def test_an_arm_file_that_is_too_sure_of_wrong_values_is_given_up(arm: Arm) -> N
     found = diagnose(logs[:1], sure, holdout=logs[1:], max_causes=0)
     assert found.verdict == "parameters"
     assert max(found.gap.refit) < 0.01 * min(found.gap.before)
+
+
+def test_a_joint_that_comes_to_rest_says_nothing_of_shifts(axis: Arm) -> None:
+    t = np.arange(4000) * axis.sample_period
+    logs = []
+    for seed in (1, 2):
+        speed, phase = np.random.default_rng(seed).uniform([[3.0], [0.0]], [[12.0], [6.28]], (2, 3))
+        tau = 52.0 + (t < 3.5) * 30.0 * np.sin(np.outer(t, speed) + phase).sum(axis=1)
+        logs.append(simulate(axis, t, tau, noise=1e-6, seed=seed, name=f"run {seed}"))
+    assert checked(logs, axis) == []
+    assert time_shift.acausal(logs, axis) is None
+    assert time_shift.acausal(late(logs, 3), axis) == 3
+
+
+def test_a_torque_that_never_changes_has_no_shift(axis: Arm) -> None:
+    logs = [replace(log, tau=np.full_like(log.tau, 52.0)) for log in lifts(axis, 30.0)]
+    assert time_shift.acausal(logs, axis) in (None, 0)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from armgap import _native
 from armgap.arm.arm import Arm
 from armgap.check.drive_limit import Delivered, as_commanded, deliver, delivered
-from armgap.check.equation_error import EquationError, Fit, Rows, bounds
+from armgap.check.equation_error import FEWEST_ROWS, EquationError, Fit, Rows, bounds
 from armgap.check.readings import (
     gravity_missing,
     gravity_sign,
@@ -175,9 +175,13 @@ def start_beside_file(logs: Sequence[Log], arm: Arm) -> list[float] | None:
     Returns
     -------
     list of float, optional
-        Parameters within the bounds [SI], `_FAR` standard deviations of the arm file or more from its values.
+        Parameters within the bounds [SI], some of them more than `_FAR` standard deviations of the arm file from its values; those that the arm file
+        gives as zero are zero. None with fewer than `FEWEST_ROWS` rows too.
     """
-    start = _start(deliver(logs, delivered(logs, arm).levels), arm)
+    found = delivered(logs, arm)
+    if len(found.errors) < FEWEST_ROWS:
+        return None
+    start = np.where(arm.theta == 0, 0.0, found.fit.theta)
     far = np.abs(start - arm.theta) > _FAR * arm.sigma
     return start.tolist() if far.any() else None
 
@@ -193,7 +197,8 @@ class Found:
     alike : tuple of Reading
         Other readings that explain the logs equally well.
     unexplained : tuple of (float, float)
-        Largest share of a joint's torque unexplained by the equation of motion: with the log as it stands, with the corrected log.
+        Largest share of a joint's torque unexplained by the equation of motion: with the log as it stands, with the corrected log. Of a drive that
+        saturates, as a share of the torque that it delivers.
     error : tuple of (ndarray, ndarray)
         RMS prediction error per joint [rad or m]: with the log as it stands, with the corrected log.
     """

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armgap.arm.arm import Arm
-from armgap.arm.corrections import Corrections
 from armgap.check.check import Check
 from armgap.check.drive_limit import deliver, delivered
 from armgap.check.equation_error import EquationError, Rows, bounds
-from armgap.log.log import Log
+from armgap.log.log import SIGNALS, Log
 
-__all__ = ["find"]
+__all__ = ["find", "without_constant"]
 
 Run = tuple[int, int, int]
 """Joint (from 0), and the first and last sample of a stretch in which the joint's torque does not change."""
@@ -27,18 +27,18 @@ _MISFIT_RATIO = 25.0
 _SHARE = 0.1
 # Largest time [s] between the beginnings of stretches of constant torque that are judged together, by rows outside of all stretches.
 _TOGETHER_S = 16.0
-# Largest part of a log in stretches of constant torque without which the limits of the drives are estimated.
-_MOST_CONSTANT = 0.5
+# Part of a log outside stretches of constant torque from which the limits of the drives, and shifts, are estimated without these stretches.
+_LEAST_KEPT = 0.5
 # Smallest number of rows of the equation of motion, inside and outside of a stretch, by which the stretch is judged.
 _MIN_STRETCH_ROWS = 30
 
 
 def find(logs: Sequence[Log], arm: Arm) -> list[Check]:
     """Return one check per stretch of a log whose torque was not recorded."""
-    runs = [[(j, first, last) for j in range(log.n_joints) for first, last in _constant(log, j)] for log in logs]
+    runs = [_runs(log) for log in logs]
     if not any(runs):
         return []
-    levels = delivered([_without(log, of_log) for log, of_log in zip(logs, runs, strict=True)], arm).levels
+    levels = delivered([without_constant(log) for log in logs], arm).levels
     checks = []
     for log, acting, of_log in zip(logs, deliver(logs, levels), runs, strict=True):
         for near in _neighbours(log, of_log):
@@ -46,12 +46,20 @@ def find(logs: Sequence[Log], arm: Arm) -> list[Check]:
     return checks
 
 
-def _without(log: Log, runs: list[Run]) -> Log:
-    """Return a log without the samples of stretches of constant torque; the log itself where they are most of it."""
-    constant = sum(last - first + 1 for _, first, last in runs)
-    if not 0 < constant < _MOST_CONSTANT * len(log):
+def without_constant(log: Log) -> Log:
+    """Return a log without stretches of constant torque of any joint, which may be dead; the log itself where they are half of it or more."""
+    kept = np.ones(len(log), dtype=bool)
+    for _, first, last in _runs(log):
+        kept[first : last + 1] = False
+    if kept.all() or kept.mean() <= _LEAST_KEPT:
         return log
-    return Corrections(skip=tuple(f"{log.t[first]:.9g}-{log.t[last]:.9g}" for _, first, last in runs)).on_log(log)
+    arrays = {name: x[kept] for name in ("t", *SIGNALS) if (x := getattr(log, name)) is not None}
+    return replace(log, **arrays)
+
+
+def _runs(log: Log) -> list[Run]:
+    """Return the stretches of a log in which a joint's torque does not change although it does elsewhere."""
+    return [(j, first, last) for j in range(log.n_joints) for first, last in _constant(log, j)]
 
 
 def _around(near: list[Run]) -> tuple[int, int]:

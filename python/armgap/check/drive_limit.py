@@ -58,7 +58,7 @@ _SLEW_TIMES = tuple(0.05 * 1.25**k for k in range(25))
 # A joint is driven if its commands' mean square exceeds this part of that of the largest term of its equation of motion; a joint that is
 # not driven, as the passive joint of an acrobot, has no torque to be explained.
 DRIVEN = 0.1
-# Steps by golden section from the best quantile's neighbours to the level: the level is then known to 2 % of their distance.
+# Steps by golden section from the best quantile's neighbours (or zero, or the largest command) to the level, known to 2 % of their distance then.
 _SECTIONS = 8
 _GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 
@@ -75,11 +75,14 @@ class Delivered:
         Equation error of the torques within these levels.
     fit : Fit
         Bounded fit to these torques.
+    driven : ndarray, shape (n_joints,)
+        Mask of the joints that are driven, by their commands.
     """
 
     levels: Array
     errors: EquationError
     fit: Fit
+    driven: NDArray[np.bool_]
 
     @property
     def closeness(self) -> float:
@@ -93,16 +96,12 @@ class Delivered:
     @property
     def unexplained(self) -> Array:
         """Unexplained share of the torque that each joint's drive delivers; of a joint that is not driven, of the largest term of its equation."""
-        return np.where(self._driven, self.errors.of_torques(self.fit).share, self.fit.share)
+        return np.where(self.driven, self.errors.of_torques(self.fit).share, self.fit.share)
 
     @property
     def limits_tried(self) -> NDArray[np.bool_]:
         """Mask of the joints that are driven and whose torque is not explained, so that a limit of the drive is tried."""
-        return self._driven & (self.unexplained >= TRIED)
-
-    @property
-    def _driven(self) -> NDArray[np.bool_]:
-        return self.errors.square >= DRIVEN * self.errors.scale
+        return self.driven & (self.unexplained >= TRIED)
 
 
 def deliver(logs: Sequence[Log], levels: Array) -> list[Log]:
@@ -114,7 +113,8 @@ def deliver(logs: Sequence[Log], levels: Array) -> list[Log]:
 
 def as_commanded(errors: EquationError, low: Array, high: Array) -> Delivered:
     """Return the fit, parameters between `low` and `high`, of an arm whose drives deliver what they are commanded."""
-    return Delivered(np.full(errors.arm.n_joints, np.inf), errors, errors.fit(low, high))
+    driven = errors.square >= DRIVEN * errors.scale
+    return Delivered(np.full(errors.arm.n_joints, np.inf), errors, errors.fit(low, high), driven)
 
 
 def delivered(logs: Sequence[Log], arm: Arm, *between: Array, stands: EquationError | None = None) -> Delivered:
@@ -151,17 +151,20 @@ def _at_best_level(joint: int, logs: Sequence[Log], now: Delivered, low: Array, 
         errors = now.errors.with_rows(
             [r.with_torque(log, joint, np.clip(log.tau[:, joint], -level, level)) for r, log in rows]
         )
-        return Delivered(tried, errors, errors.fit(low, high))
+        return Delivered(tried, errors, errors.fit(low, high), now.driven)
 
     return at_best_level(at, logs, joint, lambda found: found.of_torque(joint))
 
 
 def at_best_level(at: Callable[[float], T], logs: Sequence[Log], joint: int, share: Callable[[T], float]) -> T:
     """Return what `at` finds at the level [N m or N] of a joint's drive where `share` of it is least, by a grid of levels and golden section."""
-    grid = np.unique(np.quantile(np.abs(np.concatenate([log.tau[:, joint] for log in logs])), _LIMIT_QUANTILES))
+    sizes = np.abs(np.concatenate([log.tau[:, joint] for log in logs]))
+    grid = np.unique(np.quantile(sizes, _LIMIT_QUANTILES))
+    # A level of zero is no drive, and would explain a joint that never moves.
+    grid = grid[grid > 0] if grid[-1] > 0 else np.array([sizes.max()])
     on_grid = [at(level) for level in grid]
     best = int(np.argmin([share(found) for found in on_grid]))
-    a, b = grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)]
+    a, b = np.concatenate([[0.0], grid, [sizes.max()]])[[best, best + 2]]
     left, right = at(b - _GOLDEN * (b - a)), at(a + _GOLDEN * (b - a))
     for _ in range(_SECTIONS):
         if share(left) < share(right):

@@ -19,12 +19,14 @@ from armgap import _native
 from armgap.arm.arm import Arm
 from armgap.log.log import Log
 
-__all__ = ["CUTOFF", "EquationError", "Fit", "Rows", "bounds"]
+__all__ = ["CUTOFF", "FEWEST_ROWS", "EquationError", "Fit", "Rows", "bounds"]
 
 Array = NDArray[np.float64]
 
 # Cut-off of the filters [rad/s]: above the motion of arms (a few hertz), below the noise of encoders; at 2.5 ms it is 0.075 of the sample rate.
 CUTOFF = 30.0
+# Rows that parameters are estimated from, at least.
+FEWEST_ROWS = 100
 # Native description of an axis, as a filter of torques.
 _AXIS = {"kind": "axis", "gravity": 0.0, "theta": [1.0, 0.0, 0.0, 0.0], "sigma": [1.0] * 4}
 # Largest cut-off of the filters, in parts of the sample rate; it bounds the cut-off for slowly sampled logs.
@@ -143,7 +145,8 @@ class EquationError:
     """Normal equations of several logs, joint by joint, and their solution by bounded least squares.
 
     Unexplained torques are relative to `scale`, or else to the torque and the largest term of the equation of motion (`terms`), whichever is larger:
-    mean squares per joint, shape (n_joints,). Another reading of a log takes these from the log as it stands, so that the readings are comparable.
+    mean squares per joint, shape (n_joints,). Another reading of a log takes `scale` from the log as it stands, so that the readings are comparable;
+    torques that a drive delivers (`with_rows`) are measured against themselves and the terms of the log as it stands.
     """
 
     def __init__(self, rows: Sequence[Rows], arm: Arm, scale: Array | None = None, terms: Array | None = None) -> None:

@@ -14,7 +14,7 @@ from armgap.check import dead_stretch, drive_limit, time_shift, torque_is_positi
 from armgap.check.check import Check
 from armgap.check.contradiction import AS_GOOD, BETTER, EXPLAINS, Found, Refit, Suspect, confirm, screen
 from armgap.check.elastic import beside_elasticity
-from armgap.check.equation_error import EquationError, Fit, Rows, bounds
+from armgap.check.equation_error import FEWEST_ROWS, EquationError, Fit, Rows, bounds
 from armgap.log.log import Log
 from armgap.progress import report_progress
 
@@ -25,8 +25,6 @@ Array = NDArray[np.float64]
 # Difference of the mean log shares of unexplained torque of two readings below which predictions decide between them. A reading that explains less
 # than springs and contacts do, by this much, is rejected; not the reverse, for wrongly read gravity is equivalent to a spring in many logs.
 _CLOSE_COST_DIFFERENCE = 1.0
-# Rows of the equation of motion that the comparison of readings needs.
-_FEWEST_ROWS = 100
 # Thresholds above which torque and position columns do not belong together. First numbers: unexplained share of what moves a joint (its torque, or
 # the largest term of its equation of motion), and prediction error as a part of the motion; second numbers: unexplained share of a driven joint's
 # torque, and prediction error of the best model with the library's effects. Effects of the library leave less than a tenth of a torque on simulated
@@ -104,7 +102,7 @@ def _reading(now: Examined, horizon: float, repair: bool) -> Examined:
     """Find another reading of the columns: a factor on torques, or a reading of `contradiction.READINGS`."""
     logs = [*now.training, *now.holdout]
     base = EquationError([Rows.of(log, now.arm) for log in logs], now.arm)
-    if len(base) < _FEWEST_ROWS:
+    if len(base) < FEWEST_ROWS:
         return now
     stands, suspects = screen(base, logs, now.arm)
     factors = torque_unit.find(base, logs, now.arm)
@@ -146,7 +144,7 @@ def unexplained_columns(
         return []
     logs = [*training, *holdout]
     base = EquationError([Rows.of(log, arm) for log in logs], arm)
-    if len(base) < _FEWEST_ROWS:
+    if len(base) < FEWEST_ROWS:
         return []
     elastic = base.of_torques(_beside_elasticity(base, logs, arm))
     share = np.where(base.square >= drive_limit.DRIVEN * base.scale, elastic.share, 0.0)

@@ -18,6 +18,7 @@ from armgap.arm.arm import Arm
 from armgap.arm.corrections import Corrections
 from armgap.check.check import Check
 from armgap.check.contradiction import BETTER, Refit
+from armgap.check.dead_stretch import without_constant
 from armgap.check.drive_limit import deliver, delivered
 from armgap.check.equation_error import EquationError, Rows, bounds
 from armgap.log.log import Log
@@ -65,6 +66,7 @@ _TAKEN_BACK = 0.7
 
 def acausal(logs: Sequence[Log], arm: Arm) -> int | None:
     """Return by how many samples the torques of all logs come late in the file; 0 if only a part of the logs shows it, None if none does."""
+    logs = [without_constant(log) for log in logs]
     logs = deliver(logs, delivered(logs, arm).levels)
     curves = [_curve(rows, moving, arm) for log in logs for rows, moving in _halves(log, arm)]
     says = [-_minimum(curve) > 0.5 * _COUNTS for curve in curves]
@@ -77,14 +79,19 @@ def acausal(logs: Sequence[Log], arm: Arm) -> int | None:
 
 
 def _halves(log: Log, arm: Arm) -> list[tuple[Rows, Mask]]:
-    """Return the rows of the equation of motion in two halves of the log, for independent estimates, each with its mask of moving joints."""
+    """Return the rows of the equation of motion in two halves of the log, for independent estimates, each with its mask of moving joints.
+
+    Joints that move for fewer than `_MIN_HALF_LOG_ROWS` rows of a half do not count in it; a half without moving joints is left out.
+    """
     rows = Rows.of(log, arm, _SHIFT_CUTOFF)
     if len(rows.y) < 2 * _MIN_HALF_LOG_ROWS:
         return []
     moving = _moving(log, rows.samples)
     middle = len(rows.y) // 2
     parts = [slice(0, middle), slice(middle, None)]
-    return [(Rows(rows.psi[part], rows.y[part], rows.samples[part]), moving[part]) for part in parts]
+    halves = [(Rows(rows.psi[part], rows.y[part], rows.samples[part]), moving[part]) for part in parts]
+    enough = [(half, mask & (mask.sum(axis=0) >= _MIN_HALF_LOG_ROWS)) for half, mask in halves]
+    return [(half, mask) for half, mask in enough if mask.any()]
 
 
 def _moving(log: Log, samples: NDArray[np.intp]) -> Mask:
@@ -116,23 +123,31 @@ def _running_mean(q: NDArray[np.float64], width: int) -> NDArray[np.float64]:
 
 
 def _curve(rows: Rows, moving: Mask, arm: Arm) -> NDArray[np.float64]:
-    """Return the negative log-likelihood of every shift from -8 to 8 samples, with joints weighted by their unexplained torque."""
+    """Return the negative log-likelihood of every shift from -8 to 8 samples by the rows of moving joints, weighted by their unexplained torque.
+
+    Rows within 8 samples of a hole in the log do not count.
+    """
     low, high = bounds(arm)
     count = len(rows.y)
     inner = slice(_MAX_SHIFT_SAMPLES, count - _MAX_SHIFT_SAMPLES)
-    counts = moving[inner]
+    reach = 2 * _MAX_SHIFT_SAMPLES
+    unbroken = rows.samples[reach:] - rows.samples[:-reach] == reach
+    counts = moving[inner] & unbroken[:, None]
+    weight = counts.sum(axis=0)
     base = EquationError([Rows(rows.psi[inner] * counts[:, :, None], rows.y[inner] * counts, rows.samples[inner])], arm)
     shifted = [
         rows.y[_MAX_SHIFT_SAMPLES - s : count - _MAX_SHIFT_SAMPLES - s] * counts
         for s in range(-_MAX_SHIFT_SAMPLES, _MAX_SHIFT_SAMPLES + 1)
     ]
     return np.array(
-        [count * float(np.sum(np.log(base.fit(low, high, [y]).share + _SHIFT_SHARE_FLOOR))) for y in shifted]
+        [float(np.sum(weight * np.log(base.fit(low, high, [y]).share + _SHIFT_SHARE_FLOOR))) for y in shifted]
     )
 
 
 def _minimum(costs: NDArray[np.float64]) -> float:
-    """Return the minimum of the parabola through the least cost and its neighbours: a shift [samples]."""
+    """Return the minimum of the parabola through the least cost and its neighbours: a shift [samples]; 0 where all shifts cost the same."""
+    if np.ptp(costs) == 0:
+        return 0.0
     i = int(np.argmin(costs))
     if i in (0, len(costs) - 1):
         return float(i - _MAX_SHIFT_SAMPLES)

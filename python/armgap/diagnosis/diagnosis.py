@@ -146,10 +146,7 @@ def _diagnose(given: PreparedInput, settings: dict[str, Any], effects: Sequence[
         # No effect is fitted to contradictory input: the gap is that of the arm with re-estimated parameters.
         settings = settings | {"max_causes": 0}
     tables = TorqueTables.of(effects, training, held)
-    settings = settings | {
-        "own": [e.joint - 1 for e in effects],
-        "start": start_beside_file(training, arm) if arm.chain is None else None,
-    }
+    settings = settings | {"own": [e.joint - 1 for e in effects]}
     if arm.chain is not None:
         changed, notes = serial_settings(given.checks)
         settings, given = settings | changed, replace(given, notes=(*given.notes, *notes))
@@ -200,6 +197,8 @@ def _diagnose(given: PreparedInput, settings: dict[str, Any], effects: Sequence[
 def _attributed(given: PreparedInput, settings: dict[str, Any], tables: TorqueTables) -> dict[str, Any]:
     """Return the result of the compiled core on prepared input, as a dict; custom effects have numbers for names."""
     training, held = given.training, given.holdout
+    if given.arm.chain is None:
+        settings = settings | {"start": start_beside_file(training, given.arm)}
     try:
         text = _native.diagnose(
             given.arm.to_native(),
