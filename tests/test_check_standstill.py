@@ -10,6 +10,8 @@ import pytest
 
 from armgap import Arm, Log, diagnose, simulate
 from armgap.check import Check, examine, time_shift
+from armgap.check.equation_error import EquationError, Rows, bounds
+from armgap.simulation import Effect
 from swings import carried
 
 AXIS = """\
@@ -104,3 +106,14 @@ def test_a_joint_that_comes_to_rest_says_nothing_of_shifts(axis: Arm) -> None:
 def test_a_torque_that_never_changes_has_no_shift(axis: Arm) -> None:
     logs = [replace(log, tau=np.full_like(log.tau, 52.0)) for log in lifts(axis, 30.0)]
     assert time_shift.acausal(logs, axis) in (None, 0)
+
+
+def test_a_joint_that_sticks_behind_a_limited_drive_is_of_this_arm(arm: Arm) -> None:
+    logs = carried(arm, Effect("torque_saturation", 2, {"level": 1.1 * arm.theta[-1]}), scale=0.25)
+    base = EquationError([Rows.of(log, arm) for log in logs], arm)
+    moving = np.concatenate([rows.moving(log) for log, rows in zip(logs, base.rows, strict=True)])
+    assert moving[:, 1].mean() < 0.5
+    assert not any(check.severity == "error" for check in checked(logs, arm))
+    within = EquationError([r.within(r.moving(log)) for log, r in zip(logs, base.rows, strict=True)], arm)
+    low, high = bounds(arm)
+    assert within.of_torques(within.fit(low, high)).share[1] < 0.1 * base.of_torques(base.fit(low, high)).share[1]

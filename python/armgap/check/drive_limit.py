@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armgap.arm.arm import Arm
-from armgap.check.equation_error import EquationError, Fit, Rows, bounds
+from armgap.check.equation_error import EquationError, Fit, Mask, Rows, bounds
 from armgap.log.log import Log
 
 __all__ = [
@@ -176,14 +176,19 @@ def at_best_level(at: Callable[[float], T], logs: Sequence[Log], joint: int, sha
     return min((on_grid[best], left, right), key=share)
 
 
-def limited(logs: Sequence[Log], arm: Arm, joint: int) -> tuple[EquationError, Fit]:
+def limited(
+    logs: Sequence[Log], arm: Arm, joint: int, masks: Sequence[Mask] | None = None
+) -> tuple[EquationError, Fit]:
     """Return the equation error and the best fit with the torques of one joint limited in size or in rate.
 
-    A limit in size far below the command looks like a small factor, a limit in rate like columns of another arm.
+    A limit in size far below the command looks like a small factor, a limit in rate like columns of another arm. With `masks`, one per log, only
+    the rows within these count (`Rows.within`).
     """
     low, high = bounds(arm, PARAMETER_BOUND_FACTOR)
 
     def of(errors: EquationError) -> tuple[EquationError, Fit]:
+        if masks is not None:
+            errors = EquationError([r.within(mask) for r, mask in zip(errors.rows, masks, strict=True)], arm)
         return errors, errors.of_torques(errors.fit(low, high))
 
     def closeness(found: tuple[EquationError, Fit]) -> float:

@@ -155,15 +155,17 @@ def _strangers(share: Array, now: Examined, horizon: float, pair: int) -> list[C
     """Return a check that torques and positions do not belong together, by pair `pair` of the thresholds `_UNRELATED`.
 
     The check is returned where parameters with the arm file's signs leave a part of a torque unexplained (`share` per joint), even together with
-    springs and contacts or with a drive that saturates far below its command, and do not predict the motion even with shifted torques. The part
-    of a torque that noise of the positions leaves unexplained is not counted.
+    springs and contacts or, while the joint moves, with a drive that saturates far below its command, and do not predict the motion even with
+    shifted torques. The part of a torque that noise of the positions leaves unexplained is not counted.
     """
     worst = int(np.argmax(share))
     logs = [*now.training, *now.holdout]
     if share[worst] < _UNRELATED[pair]:
         return []
-    noise = EquationError([Rows.of(log, now.arm) for log in logs], now.arm).noise_square(logs)
-    limited, fit = drive_limit.limited(logs, now.arm, worst)
+    base = EquationError([Rows.of(log, now.arm) for log in logs], now.arm)
+    masks = [rows.moving(log) for log, rows in zip(logs, base.rows, strict=True)]
+    limited, fit = drive_limit.limited(logs, now.arm, worst, masks)
+    noise = base.noise_square(logs) * np.mean(np.concatenate(masks), axis=0)
     if (fit.share - noise / np.maximum(limited.square, np.finfo(float).tiny)).max() < drive_limit.LIMITED:
         return []
     period = float(np.median(np.diff(logs[0].t)))

@@ -31,11 +31,9 @@ __all__ = ["acausal", "causal", "confirmed", "early", "explains_better", "taken_
 # Largest shift of the torques that is tried [samples].
 _MAX_SHIFT_SAMPLES = 8
 # Cut-off of the filters [rad/s]: a shift shows in the motion; a controller's response to encoder noise would hide it. On 74 cases without delay or
-# lag the middle 80 % of the estimates are -0.02 to 0.22 samples at 10, 20 and 30 rad/s; the least are -1.5, -0.5 and -0.6 samples.
+# lag the middle 80 % of the estimates are -0.02 to 0.22 samples at 10, 20 and 30 rad/s; the least are -1.5, -0.5 and -0.6 samples. With
+# rows that remember a standstill the middle 80 % are 0 to 0.9 samples.
 _SHIFT_CUTOFF = 20.0
-# A joint stands still where its speed, over so many seconds and samples at least, is below this part of its RMS; a row counts where standstill makes
-# less than this part of what the filters remember. With all rows the middle 80 % of those estimates are 0 to 0.9 samples.
-_SPEED_S, _SPEED_SAMPLES, _STANDSTILL, _REMEMBERED = 0.01, 3, 0.05, 0.05
 # Smallest shift of the torques that counts, in samples. On simulated logs with hidden effects the estimate is -0.25 to 0.85 samples off, and
 # a lag of a drive cannot make the shift negative.
 _COUNTS = 0.6
@@ -95,40 +93,12 @@ def _halves(log: Log, arm: Arm) -> list[tuple[Rows, Mask]]:
     rows = Rows.of(log, arm, _SHIFT_CUTOFF)
     if len(rows.y) < 2 * _MIN_HALF_LOG_ROWS:
         return []
-    moving = _moving(log, rows.samples)
+    moving = rows.moving(log, _SHIFT_CUTOFF)
     middle = len(rows.y) // 2
     parts = [slice(0, middle), slice(middle, None)]
     halves = [(Rows(rows.psi[part], rows.y[part], rows.samples[part]), moving[part]) for part in parts]
     enough = [(half, mask & (mask.sum(axis=0) >= _MIN_HALF_LOG_ROWS)) for half, mask in halves]
     return [(half, mask) for half, mask in enough if mask.any()]
-
-
-def _moving(log: Log, samples: NDArray[np.intp]) -> Mask:
-    """Return a mask of the rows at `samples` and the joints that have been moving for as long as the filters remember, shape (n_rows, n_joints).
-
-    The friction of a joint at rest is any torque up to its break-away torque and not that of the equation of motion. Rows that remember a standstill
-    moved estimates of the shift by up to 8 samples.
-    """
-    period = log.sample_period
-    width = max(_SPEED_SAMPLES, round(_SPEED_S / period)) | 1
-    first, last = samples[0], samples[-1]
-    speed = np.abs(np.gradient(_running_mean(log.q[first : last + 1], width), log.t[first : last + 1], axis=0))
-    slow = speed < _STANDSTILL * np.sqrt(np.mean(speed**2, axis=0))
-    forget = math.exp(-_SHIFT_CUTOFF * period)
-    memory, remembered = np.zeros(slow.shape), np.zeros(slow.shape[1])
-    for k, now in enumerate(slow):
-        remembered = forget * remembered + (1.0 - forget) * now
-        memory[k] = remembered
-    moving: Mask = memory[samples - first] < _REMEMBERED
-    return moving
-
-
-def _running_mean(q: NDArray[np.float64], width: int) -> NDArray[np.float64]:
-    """Return the mean of each column over windows of `width` samples, an odd number; the first and last windows are filled with end values."""
-    padded = np.pad(q, ((width // 2, width // 2), (0, 0)), mode="edge")
-    total = np.cumsum(np.vstack([np.zeros(q.shape[1]), padded]), axis=0)
-    mean: NDArray[np.float64] = (total[width:] - total[:-width]) / width
-    return mean
 
 
 def _curve(rows: Rows, moving: Mask, arm: Arm) -> NDArray[np.float64]:
@@ -143,7 +113,7 @@ def _curve(rows: Rows, moving: Mask, arm: Arm) -> NDArray[np.float64]:
     unbroken = rows.samples[reach:] - rows.samples[:-reach] == reach
     counts = moving[inner] & unbroken[:, None]
     weight = counts.sum(axis=0)
-    base = EquationError([Rows(rows.psi[inner] * counts[:, :, None], rows.y[inner] * counts, rows.samples[inner])], arm)
+    base = EquationError([Rows(rows.psi[inner], rows.y[inner], rows.samples[inner]).within(counts)], arm)
     shifted = [
         rows.y[_MAX_SHIFT_SAMPLES - s : count - _MAX_SHIFT_SAMPLES - s] * counts
         for s in range(-_MAX_SHIFT_SAMPLES, _MAX_SHIFT_SAMPLES + 1)
