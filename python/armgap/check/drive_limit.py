@@ -177,44 +177,47 @@ def at_best_level(at: Callable[[float], T], logs: Sequence[Log], joint: int, sha
 
 
 def limited(
-    logs: Sequence[Log], arm: Arm, joint: int, masks: Sequence[Mask] | None = None
+    base: EquationError, logs: Sequence[Log], joint: int, masks: Sequence[Mask] | None = None
 ) -> tuple[EquationError, Fit]:
-    """Return the equation error and the best fit with the torques of one joint limited in size or in rate.
+    """Return the equation error and the best fit with the torques of one joint of logs (`base`) limited in size or in rate.
 
     A limit in size far below the command looks like a small factor, a limit in rate like columns of another arm. With `masks`, one per log, only
     the rows within these count (`Rows.within`).
     """
-    low, high = bounds(arm, PARAMETER_BOUND_FACTOR)
+    low, high = bounds(base.arm, PARAMETER_BOUND_FACTOR)
 
     def of(errors: EquationError) -> tuple[EquationError, Fit]:
         if masks is not None:
-            errors = EquationError([r.within(mask) for r, mask in zip(errors.rows, masks, strict=True)], arm)
+            errors = EquationError([r.within(mask) for r, mask in zip(errors.rows, masks, strict=True)], base.arm)
         return errors, errors.of_torques(errors.fit(low, high))
 
     def closeness(found: tuple[EquationError, Fit]) -> float:
         return found[1].closeness
 
-    sized = at_best_level(lambda level: of(at_level(logs, arm, joint, level)[1]), logs, joint, closeness)
-    return min((sized, *(of(errors) for _, errors in at_rates(logs, arm, joint))), key=closeness)
+    sized = at_best_level(lambda level: of(at_level(base, logs, joint, level)[1]), logs, joint, closeness)
+    return min((sized, *(of(errors) for _, errors in at_rates(base, logs, joint))), key=closeness)
 
 
-def at_level(logs: Sequence[Log], arm: Arm, joint: int, level: float) -> tuple[list[Log], EquationError]:
-    """Return the logs with one joint's torques within a level [N m or N], and their equation error."""
-    return _of_joint(logs, arm, joint, [np.clip(log.tau[:, joint], -level, level) for log in logs])
+def at_level(base: EquationError, logs: Sequence[Log], joint: int, level: float) -> tuple[list[Log], EquationError]:
+    """Return logs (`base`) with one joint's torques within a level [N m or N], and their equation error."""
+    return _of_joint(base, logs, joint, [np.clip(log.tau[:, joint], -level, level) for log in logs])
 
 
-def at_rates(logs: Sequence[Log], arm: Arm, joint: int) -> Iterator[tuple[list[Log], EquationError]]:
-    """Yield the logs with one joint's torques limited in rate, and their equation error, for each rate that is tried."""
+def at_rates(base: EquationError, logs: Sequence[Log], joint: int) -> Iterator[tuple[list[Log], EquationError]]:
+    """Yield logs (`base`) with one joint's torques limited in rate, and their equation error, for each rate that is tried."""
     tau = [log.tau[:, joint] for log in logs]
     rates = max(float(np.ptp(x)) for x in tau) / np.array(_SLEW_TIMES)
     for slewed in zip(*(_slewed(log.t, x, rates) for log, x in zip(logs, tau, strict=True)), strict=True):
-        yield _of_joint(logs, arm, joint, slewed)
+        yield _of_joint(base, logs, joint, slewed)
 
 
-def _of_joint(logs: Sequence[Log], arm: Arm, joint: int, torques: Sequence[Array]) -> tuple[list[Log], EquationError]:
+def _of_joint(
+    base: EquationError, logs: Sequence[Log], joint: int, torques: Sequence[Array]
+) -> tuple[list[Log], EquationError]:
     """Return the logs with other torques of one joint, and their equation error."""
     there = [_with_torques(log, x, joint) for log, x in zip(logs, torques, strict=True)]
-    return there, EquationError([Rows.of(log, arm) for log in there], arm)
+    rows = zip(base.rows, logs, torques, strict=True)
+    return there, base.with_rows([r.with_torque(log, joint, x) for r, log, x in rows])
 
 
 def _slewed(t: Array, tau: Array, rates: Array) -> Array:

@@ -164,7 +164,7 @@ def _strangers(share: Array, now: Examined, horizon: float, pair: int) -> list[C
         return []
     base = EquationError([Rows.of(log, now.arm) for log in logs], now.arm)
     masks = [rows.moving(log) for log, rows in zip(logs, base.rows, strict=True)]
-    limited, fit = drive_limit.limited(logs, now.arm, worst, masks)
+    limited, fit = drive_limit.limited(base, logs, worst, masks)
     noise = base.noise_square(logs) * np.mean(np.concatenate(masks), axis=0)
     if (fit.share - noise / np.maximum(limited.square, np.finfo(float).tiny)).max() < drive_limit.LIMITED:
         return []

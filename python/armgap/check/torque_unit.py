@@ -82,7 +82,7 @@ def find(base: EquationError, logs: Sequence[Log], arm: Arm) -> Factors | None:
     """Return the factors that scale torque columns of the logs (`base`) to the arm file, or None; saturation of a drive is no factor."""
     low, high = bounds(arm, PARAMETER_BOUND_FACTOR)
     read = _read(base, logs, arm)
-    base, factors = read.errors, read.factors
+    stands, base, factors = base, read.errors, read.factors
     known = read.share < _MAX_UNEXPLAINED_SHARE
     odd = [j for j, c in enumerate(factors) if known[j] and not _within(c, _GAIN)]
     if not odd or np.any(factors[known] <= 0):
@@ -101,7 +101,7 @@ def find(base: EquationError, logs: Sequence[Log], arm: Arm) -> Factors | None:
     scaled = shared and _within(applied[0], _SCALED)
     if gain < (0.0 if scaled else _GAIN_IN_COST) or (scaled and _friction_stands(base, arm, applied[0])):
         return None
-    if min(limited(logs, arm, j)[1].closeness for j in odd) < fit.closeness:
+    if min(limited(stands, logs, j)[1].closeness for j in odd) < fit.closeness:
         return None
     corrections, checks = _said(applied, odd, shared)
     doubtful = float(fit.share.max()) > TRIED or gain < _CLEAR_GAIN
@@ -159,7 +159,7 @@ def _read(base: EquationError, logs: Sequence[Log], arm: Arm) -> _Reading:
         factors = _factors(errors, low, high)
         return errors.with_factors(low, high, factors).theta, factors
 
-    now = _Reading.of(base, low, high, np.zeros(arm.n_joints))
+    now, at = _Reading.of(base, low, high, np.zeros(arm.n_joints)), base
     if all(_within(c, _GAIN) for c in now.factors):
         return now
     for joint in range(arm.n_joints):
@@ -167,9 +167,9 @@ def _read(base: EquationError, logs: Sequence[Log], arm: Arm) -> _Reading:
         if now.share[joint] < TRIED or now.factors[joint] <= 0:
             continue
         changed = now.changed | (np.arange(arm.n_joints) == joint)
-        delivered, best = _limited(logs, arm, joint, low, high, changed)
+        delivered, best = _limited(at, logs, joint, low, high, changed)
         if best.explains(joint, now):
-            logs, now = delivered, best
+            logs, now, at = delivered, best, best.errors
             continue
         beside = _Reading.of(beside_elasticity(now.errors, logs, model, [joint]), low, high, changed)
         now = beside if beside.explains(joint, now) else now
@@ -177,8 +177,8 @@ def _read(base: EquationError, logs: Sequence[Log], arm: Arm) -> _Reading:
 
 
 def _limited(
+    base: EquationError,
     logs: Sequence[Log],
-    arm: Arm,
     joint: int,
     low: NDArray[np.float64],
     high: NDArray[np.float64],
@@ -192,8 +192,8 @@ def _limited(
     def share(found: tuple[list[Log], _Reading]) -> float:
         return float(found[1].share[joint])
 
-    sized = at_best_level(lambda level: tried(at_level(logs, arm, joint, level)), logs, joint, share)
-    return min((sized, *map(tried, at_rates(logs, arm, joint))), key=share)
+    sized = at_best_level(lambda level: tried(at_level(base, logs, joint, level)), logs, joint, share)
+    return min((sized, *map(tried, at_rates(base, logs, joint))), key=share)
 
 
 def _within(factor: float, bound: float) -> bool:
