@@ -2,7 +2,7 @@
 //!
 //! * `low_pass`: Gaussian low-pass from uneven samples onto a regular grid.
 //! * `minimum`: minimum of a function of one variable.
-//! * `products`: inner products of long columns.
+//! * `products`: inner products of long columns, RMS differences by joint.
 //! * `random`: pseudo-random numbers that are reproducible on every machine.
 //! * `smooth`: local cubic least squares with uneven sample times.
 

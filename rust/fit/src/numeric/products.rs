@@ -1,4 +1,4 @@
-//! Inner products of long columns, on the vector unit of the processor in use.
+//! Inner products of long columns, on the vector unit of the processor in use, and the RMS difference of columns in rows of joints.
 
 use armgap_core::cpu::{Cpu, Kernel, Level};
 
@@ -88,7 +88,7 @@ pub fn squares(columns: &[&[f64]]) -> Vec<f64> {
     columns.iter().map(|column| product(column, column)).collect()
 }
 
-/// RMS difference of measured and predicted positions by joint, rad or m.
+/// RMS difference by joint of two columns whose rows of `N` joints follow each other, in their unit.
 pub(crate) fn rms<const N: usize>(measured: &[f64], predicted: &[f64]) -> Vec<f64> {
     let rows = (measured.len() / N).max(1) as f64;
     let squares = |j: usize| -> f64 {
