@@ -108,6 +108,16 @@ def test_torques_of_a_log_are_simulated_again(arm, arm_file, log_file, tmp_path,
     assert np.max(np.abs(again.q - log.q)) < 1.5 * np.max(arm.encoder_step)
 
 
+@pytest.mark.parametrize("duration", ["1000", "0.0001"])
+def test_a_log_of_torques_is_simulated_no_longer_than_it_lasts(duration, arm_file, log_file, tmp_path, run):
+    code, _, err = run(
+        "simulate", "--arm", arm_file, "--torque", log_file, "--duration", duration, "-o", tmp_path / "s.csv"
+    )
+    assert code == 2
+    assert "--duration" in err
+    assert "last" in err
+
+
 def test_log_from_standard_input(arm_file, seed_log):
     buffer = io.BytesIO()
     seed_log.to_polars().write_csv(buffer)

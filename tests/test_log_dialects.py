@@ -9,8 +9,9 @@ import polars as pl
 import pytest
 
 from armgap import Log
+from armgap.arm.corrections import Corrections
 from armgap.cli.common import parse_columns
-from armgap.errors import LogReadError, OptionError, TimeError, UnitError
+from armgap.errors import ColumnError, LogReadError, OptionError, TimeError, UnitError
 from armgap.log import gather, paths
 
 DEGREE = 180 / math.pi
@@ -36,6 +37,16 @@ def in_those_units(f: pl.DataFrame) -> pl.DataFrame:
     return f.with_columns(pl.col("t") * 1e3, pl.col("q1", "q2", "dq1", "dq2") * DEGREE)
 
 
+def stamps(t: pl.Expr) -> pl.Expr:
+    """Nanoseconds since 1970, exactly."""
+    return (t * 1e9).round().cast(pl.Int64) + 1_700_000_000_000_000_000
+
+
+def quoted_with_commas(f: pl.DataFrame) -> str:
+    lines = f.write_csv(separator=";").replace(".", ",").splitlines()
+    return "\n".join(";".join(f'"{cell}"' for cell in line.split(";")) for line in lines)
+
+
 @pytest.mark.parametrize(
     ("write", "kind", "says"),
     [
@@ -54,12 +65,17 @@ def in_those_units(f: pl.DataFrame) -> pl.DataFrame:
         (lambda f: "% log of today\n% " + f.write_csv(), "format", "from the comment above"),
         (lambda f: f.write_csv(separator="\t").replace(".", ","), "format", "decimal commas"),
         (lambda f: f.write_csv() + "1.99,0.1", "cleaned", "last row was cut short"),
+        (lambda f: f.write_csv() + "1.99" + ",0.1" * (len(f.columns) - 2) + ",", "cleaned", "last row was cut short"),
+        (lambda f: f.write_csv() + "1.99" + ",0.1" * (len(f.columns) - 2) + ",3.7e-", "cleaned", "last row was cut short"),
+        (lambda f: quoted_with_commas(f), "format", "decimal commas"),
+        (lambda f: f.with_columns(pl.from_epoch(stamps(pl.col("t")), "ns").dt.to_string("iso")).write_csv(), "format", ""),
         (lambda f: "\ufeff" + f.write_csv().encode().decode(), "format", ""),
         (lambda f: "// made by hand\n" + f.write_csv(), "format", ""),
     ],
     ids=[
         "units in names", "row of units", "unit behind a dash", "trailing separators", "trailing, not in the header",
-        "header in a comment", "tabs and decimal commas", "torn last row", "byte order mark", "slashes",
+        "header in a comment", "tabs and decimal commas", "torn last row", "torn before the last value", "torn within it",
+        "quoted decimal commas", "dates as text", "byte order mark", "slashes",
     ],
 )  # fmt: skip
 def test_dialect(write, kind, says, seed_log, arm, frame, tmp_path):
@@ -179,3 +195,78 @@ def test_patterns(frame, tmp_path, run, arm_file):
     status, _, err = run("diagnose", tmp_path / "*.csv", "--arm", arm_file)
     assert (status, err.count("\n")) == (2, 1)
     assert parse_columns("q1=a") == {"q1": "a"}
+
+
+def one_joint(frame: pl.DataFrame) -> pl.DataFrame:
+    return frame.select("t", "q1", "tau1", "dq1")
+
+
+def test_units_of_counters_are_converted(frame, tmp_path):
+    path = tmp_path / "log.csv"
+    f = one_joint(frame)
+    f = f.with_columns(pl.col("q1") * 1e3, pl.col("dq1") * 30 / math.pi, pl.col("tau1") * 1e3)
+    path.write_text(header(f.write_csv(), "t,q1 [mrad],tau1 [N mm],dq1 [rpm]"))
+    log = Log.read(path)
+    for column, name in ((log.q, "q1"), (log.tau, "tau1"), (log.dq, "dq1")):
+        np.testing.assert_allclose(column[:, 0], frame[name].to_numpy(), rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("mapped", [False, True])
+@pytest.mark.parametrize(("names", "column"), [("t,q1,tau1 [A]", "tau1 [A]"), ("t,q1 [counts],tau1", "q1 [counts]")])
+def test_a_unit_that_is_not_known_is_refused_until_it_is_declared(names, column, mapped, frame, tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text(header(frame.select("t", "q1", "tau1").write_csv(), names))
+    key = column.split()[0]
+    columns = {key: column} if mapped else None
+    with pytest.raises(UnitError, match="a unit that is not known") as caught:
+        Log.read(path, columns=columns)
+    unit = {"q": "rad", "tau": "Nm"}[key[:-1]]
+    assert f"--units {key[:-1]}={unit}" in caught.value.remedy
+    assert caught.value.column == column
+    log = Log.read(path, columns={key: column}, units={key[:-1]: unit})
+    np.testing.assert_array_equal(log.tau[:, 0], frame["tau1"].to_numpy())
+
+
+def test_a_row_of_units_with_one_that_is_not_known_is_no_row_of_numbers(frame, tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text(frame.select("t", "q1", "tau1").write_csv().replace("\n", "\ns,rad,A\n", 1))
+    with pytest.raises(UnitError, match="`A`, a unit that is not known"):
+        Log.read(path)
+
+
+def test_names_in_brackets_and_words_for_no_unit_are_no_units():
+    from armgap.log.conversion.spellings import foreign, is_foreign
+
+    assert foreign("position[elbow]") is None
+    assert foreign("q1 (elbow)") is None
+    assert foreign("q1 [0]") is None
+    assert foreign("q1 [mrad]") is None
+    assert not is_foreign("none")
+    assert not is_foreign("-")
+    assert is_foreign("mA")
+
+
+def test_a_column_without_a_number_is_the_only_joint(frame):
+    f = frame.select("t", pl.col("q1").alias("q"), pl.col("tau1").alias("tau"))
+    log = Log.from_frame(f)
+    np.testing.assert_array_equal(log.q[:, 0], frame["q1"].to_numpy())
+    with pytest.raises(ColumnError, match="q1"):
+        Log.from_frame(f.with_columns(frame["q2"]))
+
+
+def test_stamps_of_two_clocks_in_two_units_agree(frame):
+    f = frame.select("q1", "tau1", t=pl.from_epoch(stamps(pl.col("t")), "ns"), t_tau=pl.col("t") + 1.7e9)
+    log = Log.from_frame(f)
+    # A number of seconds since 1970 is known to 0.2 us, so some torques come a row later.
+    assert len(log) > len(frame) - 3
+    assert np.mean(log.tau[:, 0] == frame["tau1"].to_numpy()[-len(log) :]) > 0.3
+    assert "stamps in s" in said(log, "units")
+
+
+@pytest.mark.parametrize(
+    ("name", "left"), [("seed", True), ("runs/seed.csv", True), ("seed.csv", True), ("other", False)]
+)
+def test_a_span_to_be_left_out_names_a_log_or_its_file(name, left, seed_log):
+    corrected = Corrections(skip=(f"{name}:0-0.5",)).on_log(seed_log)
+    assert (len(corrected) < len(seed_log)) == left
+    assert ("--skip" in said(corrected, "corrected")) == left

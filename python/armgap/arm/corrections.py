@@ -7,12 +7,13 @@ import math
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
 from armgap.errors import ColumnError, OptionError
-from armgap.log.findings import Finding
+from armgap.log.findings import Finding, counted
 from armgap.log.log import SIGNALS
 
 if TYPE_CHECKING:
@@ -203,7 +204,7 @@ class Corrections:
         ColumnError
             If the log lacks a column that is to be corrected.
         """
-        about_log = replace(self, gravity=None)
+        about_log = replace(self, gravity=None, skip=self.spans_of(log))
         if not about_log:
             return log
         self._check_joints(log)
@@ -216,7 +217,7 @@ class Corrections:
             assert match is not None
             for values in _of(columns, _FACTORS[match[1]]):
                 values[:, slice(None) if match[2] is None else int(match[2]) - 1] *= value
-        if self.skip:
+        if about_log.skip:
             keep = ~self._skipped(log)
             if not keep.any():
                 raise OptionError(f"--skip leaves nothing of {log.name}", remedy="leave out less")
@@ -254,12 +255,20 @@ class Corrections:
     def _skipped(self, log: Log) -> Any:
         """Return a mask of the samples that the correction `skip` leaves out."""
         skipped = np.zeros(len(log), dtype=bool)
-        for span in self.skip:
+        for span in self.spans_of(log):
             match = _SPAN.fullmatch(span)
             assert match is not None
-            if match["log"] in (None, log.recording):
-                skipped |= (log.t >= float(match["first"])) & (log.t <= float(match["last"]))
+            skipped |= (log.t >= float(match["first"])) & (log.t <= float(match["last"]))
         return skipped
+
+    def spans_of(self, log: Log) -> tuple[str, ...]:
+        """Return the spans that are left out of a log: those that name no log, its name, or its file with or without the ending."""
+
+        def of_it(name: str | None) -> bool:
+            return name is None or log.recording in (name, Path(name).name, Path(name).stem)
+
+        matches = ((span, _SPAN.fullmatch(span)) for span in self.skip)
+        return tuple(span for span, match in matches if match is not None and of_it(match["log"]))
 
     def on_arm(self, arm: Arm) -> Arm:
         """Return the arm with gravity corrected: reversed or compensated."""
@@ -283,7 +292,7 @@ class Corrections:
         for column in columns:
             if _split(column)[1] >= log.n_joints:
                 raise ColumnError(
-                    f"is not there to be corrected, the log has {log.n_joints} joints",
+                    f"is not there to be corrected, the log has {counted(log.n_joints, 'joint')}",
                     remedy="correct the option",
                     file=log.path or log.name,
                     column=column,

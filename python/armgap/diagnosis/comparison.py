@@ -13,6 +13,7 @@ from armgap.diagnosis.result import MOST_BYTES, Cause, Diagnosis, Equivalent, Ru
 from armgap.errors import OptionError
 from armgap.files.reading import read_bounded
 from armgap.literals import CauseStatus, GapOutcome, Verdict, joint_units
+from armgap.log.findings import counted
 
 __all__ = ["CauseChange", "Comparison", "GapChange", "ParameterChange", "compare", "read_diagnosis"]
 
@@ -215,7 +216,7 @@ def _check(before: Diagnosis, after: Diagnosis) -> None:
     joints = [len(d.gap.before) for d in (before, after)]
     if kinds[0] != kinds[1] or joints[0] != joints[1]:
         raise OptionError(
-            f"the diagnoses are of different arms ({kinds[0]} of {joints[0]} joints, {kinds[1]} of {joints[1]})",
+            f"the diagnoses are of different arms ({kinds[0]} of {counted(joints[0], 'joint')}, {kinds[1]} of {joints[1]})",
             remedy="compare two diagnoses of one arm",
         )
     horizons = [d.gap.horizon_s for d in (before, after)]

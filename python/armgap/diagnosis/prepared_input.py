@@ -94,8 +94,16 @@ def prepare(
     read = {"training": _read(logs, arm), "holdout": [] if holdout is None else _read(holdout, arm)}
     asked = {**settings, "repair": repair, "corrections": corrections.to_dict()}
     given = _given(read["training"], read["holdout"], arm, corrections, repair=repair)
-    given = replace(given, provenance=provenance(arm, read, asked))
+    given = replace(given, notes=(*given.notes, *_idle_spans(arm, read)), provenance=provenance(arm, read, asked))
     return _examined(given, settings["horizon"], repair=repair)
+
+
+def _idle_spans(arm: Arm, read: Mapping[str, Sequence[Log]]) -> list[str]:
+    """Return notes on spans to be left out that name none of the logs."""
+    spans = () if arm.corrections is None else arm.corrections.skip
+    logs = [log for group in read.values() for log in group]
+    used = {span for log in logs for span in Corrections(skip=spans).spans_of(log)}
+    return [f"--skip {span} names none of these logs: nothing was left out" for span in spans if span not in used]
 
 
 def _given(

@@ -50,7 +50,7 @@ class Stream:
     time : str, optional
         Name of the column with the times, if the format states it.
     units : mapping
-        Units that the file states, by column, as in `armgap.log.conversion.units.FACTORS`.
+        Units that the file states, by column: as in `armgap.log.conversion.units.FACTORS`, or the file's word for a unit that is not known.
     """
 
     columns: tuple[str, ...]

@@ -114,6 +114,11 @@ def command(
         for finding in () if quiet else source.findings:
             console(error=True).print(f"note: {source.name}: {finding.message}", highlight=False, markup=False)
         source = source.with_torques("a simulation")
+        if duration is not None and not source.sample_period <= duration <= source.duration + source.sample_period:
+            raise OptionError(
+                f"--duration is {duration:g}, but the torques of {source.name} last {source.duration:.6g} s",
+                remedy=f"give {source.sample_period:g} to {source.duration:.6g} s, or longer torques",
+            )
         keep = source.t <= (duration if duration is not None else source.duration)
         t, tau, start, name = source.t[keep], source.tau[keep], _start(source), source.name
     with working("simulating", quiet=quiet):

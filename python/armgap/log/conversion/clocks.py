@@ -129,10 +129,15 @@ def _unit(times: Times, name: str, arm: Arm | None, place: Path | str, findings:
 def _tau_unit(times: Times, factor: float, name: str, findings: list[Finding]) -> float:
     """Return the seconds per unit of the torques' times: that of the positions' times unless the stamps contradict it."""
     for unit, seconds in FACTORS["t"].items():
-        if unit != "s" and _is_epoch(times, unit) and seconds != factor:
+        if _is_epoch(times, unit) and seconds != factor and not _is_epoch(times, _named(factor)):
             findings.append(Finding("units", f"the torques' times `{name}` are stamps in {unit}; converted"))
             return seconds
     return factor
+
+
+def _named(factor: float) -> str:
+    """Return the name of a unit of time from its length [s]."""
+    return next((unit for unit, seconds in FACTORS["t"].items() if seconds == factor), "s")
 
 
 def _is_epoch(times: Times, unit: str) -> bool:

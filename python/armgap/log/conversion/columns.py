@@ -12,7 +12,7 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from armgap.errors import ColumnError, LogShapeError, SampleError
+from armgap.errors import ColumnError, LogShapeError, SampleError, UnitError
 from armgap.log.conversion.index import QUANTITIES, Index
 from armgap.log.findings import Finding
 from armgap.log.recording import Recording
@@ -21,7 +21,7 @@ from armgap.progress import report_progress
 if TYPE_CHECKING:
     from armgap.arm.arm import Arm
 
-__all__ = ["OPTIONAL", "Arrays", "Names", "Raw", "extract", "left_out", "no_controller", "resolve"]
+__all__ = ["OPTIONAL", "Arrays", "Names", "Raw", "extract", "left_out", "no_controller", "resolve", "unknown_unit"]
 
 _CANONICAL = re.compile(r"^(t|t_tau|(q|tau|dq|tau_meas|q_link|q_ref|dq_ref)(?P<joint>[1-9][0-9]*))$")
 _TIMES = ("t", "t_tau")
@@ -34,12 +34,14 @@ OPTIONAL = {
 """Optional groups of columns, used only if every joint has one, with the words for each group in messages."""
 #: Largest number of columns that an error message lists.
 _LISTED_COLUMNS = 24
+# Dates as text, in UTC or without a time zone (ISO 8601).
+_DATE = r"^ *\d{4}-\d{2}-\d{2}[T ]\d{2}:\d{2}:\d{2}(\.\d{1,9})?Z? *$"
 _TICKS_S = {"ns": 1e-9, "us": 1e-6, "ms": 1e-3}
 
 
 @dataclass(frozen=True)
 class Names:
-    """Names of the recording's columns in use, by standard name, and the stated units of these columns; either `tau` or `q_ref` is empty."""
+    """Names of the recording's columns in use, by standard name, and their stated units, known and unknown; either `tau` or `q_ref` is empty."""
 
     t: str
     q: tuple[str, ...]
@@ -51,6 +53,7 @@ class Names:
     tau_meas: tuple[str, ...] | None = None
     q_link: tuple[str, ...] | None = None
     units: Mapping[str, str] = field(default_factory=dict)
+    foreign_units: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def pairs(self) -> list[tuple[str, str]]:
@@ -166,7 +169,11 @@ def _pick_all(index: Index, names: Mapping[str, str], mapping: Mapping[str, str]
     )
     found = Names(t, q, tau, dq, t_tau, q_ref, dq_ref, tau_meas, q_link)
     _check_once(index, found)
-    return replace(found, units={c: unit for _, c in found.pairs if (unit := index.unit(c)) is not None})
+    return replace(
+        found,
+        units={c: unit for _, c in found.pairs if (unit := index.unit(c)) is not None},
+        foreign_units={c: unit for _, c in found.pairs if (unit := index.foreign_unit(c)) is not None},
+    )
 
 
 def _if_all(
@@ -348,6 +355,8 @@ def _pick(index: Index, names: Mapping[str, str], key: str, within: str | None) 
     source = names.get(key, key)
     found = index.find(source, key, within=within)
     if found is None:
+        if (other := index.in_foreign_unit(source)) is not None:
+            raise unknown_unit(other, index.foreign_unit(other) or "", key, index.place, mapped=False)
         columns = index.recording.columns
         available = ", ".join(columns[:_LISTED_COLUMNS]) + (", ..." if len(columns) > _LISTED_COLUMNS else "")
         mapped = f"it is mapped to {key}, but" if key in names else "it"
@@ -358,6 +367,20 @@ def _pick(index: Index, names: Mapping[str, str], key: str, within: str | None) 
             column=source,
         )
     return found
+
+
+def unknown_unit(column: str, unit: str, key: str, place: Path | str, *, mapped: bool) -> UnitError:
+    """Return the error for a column whose stated unit is not known; with `mapped` the column is already mapped to the standard name `key`."""
+    group = key.rstrip("0123456789").partition("_")[0]
+    mapping = "" if mapped else f"--columns {key}='{column}' "
+    declared = {"t": "t=s", "q": "q=rad", "dq": "dq=rad/s", "tau": "tau=Nm"}[group]
+    factor = f" and a factor with --factor {key}=VALUE" if group == "tau" else ""
+    return UnitError(
+        f"is in `{unit}`, a unit that is not known",
+        remedy=f"convert it in the file, or read it as it is with {mapping}--units {declared}{factor}",
+        file=place,
+        column=column,
+    )
 
 
 def extract(recording: Recording, place: Path | str, names: Names) -> Raw:
@@ -392,6 +415,9 @@ def _times(
     if isinstance(series.dtype, pl.Datetime | pl.Duration) and series.null_count() == 0:
         # The type of the column states the unit of its times, so the unit need not be recognised.
         return series.to_physical().to_numpy().astype(np.int64), _TICKS_S[series.dtype.time_unit or "us"]
+    if series.dtype == pl.String and series.null_count() == 0 and series.str.contains(_DATE).all():
+        dates = series.str.strip_chars(" Z").to_numpy().astype("datetime64[ns]")
+        return dates.astype(np.int64), _TICKS_S["ns"]
     if series.dtype.is_integer() and series.null_count() == 0:
         return series.cast(pl.Int64, wrap_numerical=True).to_numpy(), None
     return _column(series, place, name), None

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from armgap.errors import ColumnError
-from armgap.log.conversion.spellings import stripped, suffixed
+from armgap.log.conversion.spellings import foreign, is_foreign, stripped, suffixed
 from armgap.log.recording import Recording
 
 __all__ = ["QUANTITIES", "Index"]
@@ -19,7 +19,10 @@ QUANTITIES = {
 
 @dataclass(frozen=True)
 class Index:
-    """Index of a recording's columns by all names that stand for a column: full name, name without unit, end of a path."""
+    """Index of a recording's columns by all names that stand for a column: full name, name without unit, end of a path.
+
+    A column ``q`` stands for ``q1`` where there is no ``q2``: the only joint of an arm.
+    """
 
     recording: Recording
     place: Path | str
@@ -44,6 +47,8 @@ class Index:
         columns = self.recording.columns
         if name in columns:
             return name
+        if name == key and name[-1:] == "1" and name[:-1] in columns and f"{name[:-1]}2" not in columns:
+            return name[:-1]
         for fits in (
             [c for c in columns if stripped(c)[0] == name],
             [c for c in columns if suffixed(c) != (c, None) and suffixed(c)[0] == name],
@@ -68,7 +73,21 @@ class Index:
     def unit(self, column: str) -> str | None:
         """Return the unit that the file states for a column, in its metadata or in the column's name; None if it states none."""
         stated = self.recording.stream_of(column).units.get(column)
-        return stated or stripped(column)[1] or suffixed(column)[1]
+        known = stated if stated is not None and not is_foreign(stated) else None
+        return known or stripped(column)[1] or suffixed(column)[1]
+
+    def foreign_unit(self, column: str) -> str | None:
+        """Return the unit that the file states for a column where armgap does not know it; None otherwise."""
+        stated = self.recording.stream_of(column).units.get(column)
+        if stated is not None and is_foreign(stated):
+            return stated
+        named = foreign(column)
+        return named[1] if named is not None else None
+
+    def in_foreign_unit(self, name: str) -> str | None:
+        """Return the column that has a name but for a unit that armgap does not know, as ``tau1 [A]``; None if there is none."""
+        fits = [c for c in self.recording.columns if (named := foreign(c)) is not None and named[0] == name]
+        return fits[0] if len(fits) == 1 else None
 
     @staticmethod
     def _quantity(name: str, key: str) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armgap.errors import OptionError, UnitError
-from armgap.log.conversion.columns import Arrays, Names
+from armgap.log.conversion.columns import Arrays, Names, unknown_unit
 from armgap.log.conversion.turns import TURN, unwrapped
 from armgap.log.findings import Finding
 
@@ -25,8 +25,8 @@ _DEGREE = math.pi / 180
 
 FACTORS: dict[str, dict[str, float]] = {
     "t": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},
-    "q": {"rad": 1.0, "deg": _DEGREE, "turns": 2 * math.pi, "m": 1.0, "mm": 1e-3},
-    "dq": {"rad/s": 1.0, "deg/s": _DEGREE, "m/s": 1.0, "mm/s": 1e-3},
+    "q": {"rad": 1.0, "mrad": 1e-3, "deg": _DEGREE, "turns": 2 * math.pi, "m": 1.0, "mm": 1e-3},
+    "dq": {"rad/s": 1.0, "mrad/s": 1e-3, "deg/s": _DEGREE, "rpm": math.pi / 30, "m/s": 1.0, "mm/s": 1e-3},
     "tau": {"Nm": 1.0, "mNm": 1e-3, "N": 1.0, "kN": 1e3},
 }
 """Factors to SI of the units that can be declared, by group of columns and unit."""
@@ -88,10 +88,14 @@ def stated(names: Names, declared: Mapping[str, str], arm: Arm | None, place: Pa
     OptionError
         If a declared group or its unit is unknown, or does not suit the arm.
     UnitError
-        If the file states a unit that does not suit the column.
+        If the file states a unit that is not known, or does not suit the column.
     """
     by_user = {group: _factor(group, unit, arm) for group, unit in declared.items()}
     groups = {"t": (names.t,), "q": names.q, "tau": names.tau, "dq": names.dq or ()}
+    for key, column in names.pairs:
+        group = "t" if key in ("t", "t_tau") else key.rstrip("0123456789").partition("_")[0]
+        if column in names.foreign_units and group not in by_user:
+            raise unknown_unit(column, names.foreign_units[column], key, place, mapped=True)
     findings: list[Finding] = []
     settled = set(by_user)
 
@@ -175,7 +179,7 @@ def _factor(group: str, unit: str, arm: Arm | None) -> float:
 
 def _suits(group: str, unit: str, arm: Arm | None, j: int) -> bool:
     """Whether a unit is possible for a column of joint `j` (from 0)."""
-    angular = unit.startswith(("rad", "deg", "turns")) or unit.endswith("Nm")
+    angular = unit.startswith(("rad", "mrad", "deg", "turns", "rpm")) or unit.endswith("Nm")
     return arm is None or group == "t" or j >= arm.n_joints or angular == arm.rotary_joints[j]
 
 

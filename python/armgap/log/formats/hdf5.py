@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armgap.log import guard
-from armgap.log.conversion.spellings import unit_of
+from armgap.log.conversion.spellings import is_foreign, unit_of
 from armgap.log.findings import Finding
 from armgap.log.formats import arrays
 from armgap.log.formats.format import Format, load, reading
@@ -49,7 +49,8 @@ def content(source: Source) -> Held:
         array = np.asarray(item[()])
         held[name] = array.T if matlab is not None else array  # MATLAB stores arrays in column-major order
         for attribute in _UNIT_ATTRIBUTES:
-            if (unit := unit_of(_text(item.attrs.get(attribute)))) is not None:
+            text = _text(item.attrs.get(attribute))
+            if unit := unit_of(text) or (text if is_foreign(text) else None):
                 units[name] = unit
 
     with source.open() as stream, h5py.File(stream, "r") as file:

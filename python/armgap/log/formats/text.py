@@ -18,7 +18,7 @@ from pathlib import Path
 import polars as pl
 
 from armgap.errors import ColumnError, LogReadError
-from armgap.log.conversion.spellings import unit_of
+from armgap.log.conversion.spellings import is_foreign, unit_of
 from armgap.log.findings import Finding
 from armgap.log.formats.format import Format, first_line
 from armgap.log.recording import Recording, Source, Stream
@@ -28,8 +28,8 @@ __all__ = ["FORMAT"]
 
 _SEPARATORS = (",", ";", "\t")
 _COMMENTS = ("#", "%", "//")
-_COMMA = re.compile(r"(?:^|[;\s])[+-]?\d*,\d+(?:[eE][+-]?\d+)?(?:$|[;\s])")
-_POINT = re.compile(r"(?:^|[;\s])[+-]?\d*\.\d+(?:[eE][+-]?\d+)?(?:$|[;\s])")
+_COMMA = re.compile(r"(?:^|[;\s\"])[+-]?\d*,\d+(?:[eE][+-]?\d+)?(?:$|[;\s\"])")
+_POINT = re.compile(r"(?:^|[;\s\"])[+-]?\d*\.\d+(?:[eE][+-]?\d+)?(?:$|[;\s\"])")
 _BLOCK = 100_000  # lines that are parsed at once
 _PROGRESS_LINES = 10_000  # lines between two updates of the number of bytes read
 _SAMPLE = 1000  # lines by which decimal commas are recognised
@@ -168,15 +168,16 @@ def _no_header(cells: list[str], path: Path) -> ColumnError:
 
 
 def _is_units_row(cells: list[str]) -> bool:
-    """Whether a row below the header holds only units."""
-    units = [unit_of(cell.strip("[]()")) for cell in cells]
-    return any(units) and all(unit or cell in ("", "-") for unit, cell in zip(units, cells, strict=True))
+    """Whether a row below the header holds only units, one of them known."""
+    bare = [cell.strip("[]()") for cell in cells]
+    return any(map(unit_of, bare)) and all(unit_of(cell) or is_foreign(cell) or cell in ("", "-") for cell in bare)
 
 
 def _names(cells: list[str], below: list[str], path: Path) -> tuple[tuple[str, ...], dict[str, str]]:
     """Return column names, and units by name from the row below the header."""
     names = [cell or f"unnamed{i + 1}" for i, cell in enumerate(cells)]
-    units = {name: unit for name, cell in zip(names, below, strict=False) if (unit := unit_of(cell.strip("[]()")))}
+    stated = {name: cell.strip("[]()") for name, cell in zip(names, below, strict=False)}
+    units = {name: unit_of(text) or text for name, text in stated.items() if unit_of(text) or is_foreign(text)}
     for name in names:
         if names.count(name) > 1:
             raise ColumnError(
@@ -212,7 +213,11 @@ def _add(table: _Table, block: list[str], dialect: _Dialect, lines: _Lines, path
 
 def _drop_torn(table: _Table, block: list[str], dialect: _Dialect) -> None:
     """Remove a last line of a text table that was not completely written."""
-    torn = block[-1].count(dialect.separator) + 1 < dialect.width and '"' not in block[-1]
+    cells = block[-1].split(dialect.separator)
+    ends_in_number = _is_number(cells[-1], dialect.separator) or not _is_number(
+        block[0].split(dialect.separator)[-1], dialect.separator
+    )
+    torn = '"' not in block[-1] and (len(cells) < dialect.width or not ends_in_number)
     if torn and table.rows + len(block) > 1:
         del block[-1]
         table.findings.append(Finding("cleaned", "the last row was cut short while it was written; it is left out"))
