@@ -13,7 +13,7 @@ import pytest
 
 from armgap import Arm, Diagnosis, Log, diagnose
 from armgap.errors import LogShapeError, OptionError
-from armgap.simulation import Effect
+from armgap.simulation import Effect, simulate
 from diagnosis_schema.checking import losses, misfits
 from swings import swing
 
@@ -66,6 +66,29 @@ def test_a_hidden_effect_is_named_placed_and_sized(found):
     for name, truth in STRIBECK.parameters.items():
         assert abs(first.parameters[name].value / truth - 1) < 0.05
     assert found.gap.after[0] < 0.2 * found.gap.before[0]
+
+
+def test_effects_that_no_log_tells_apart_share_one_probability(tmp_path):
+    """A constant force, a tilted base and a shifted zero of a horizontal axis restore the arm file's values alike: one of them is there."""
+    file = tmp_path / "axis.toml"
+    file.write_text(
+        'kind = "axis"\nsample_period = 0.001\n[inertial]\ntheta = [11.0, 0.0]\n[friction]\nviscous = [28.0]\ncoulomb = [14.0]\n'
+    )
+    axis = Arm.read(file)
+    real = dataclasses.replace(axis, theta=np.array([12.0, 0.0, 30.0, 15.0]))
+
+    def run(seed: int) -> Log:
+        size, rate, phase = np.random.default_rng(seed).uniform(size=(3, 5))
+        t = np.arange(6000) * 0.001
+        tau = ((20 + 60 * size)[:, None] * np.sin((2 + 20 * rate)[:, None] * t + 2 * math.pi * phase[:, None])).sum(0)
+        return simulate(
+            real, t, tau[:, None], effects=[Effect("torque_offset", 1, {"offset": 6.0})], noise=1e-6, seed=seed
+        )
+
+    cause = diagnose(run(1), axis, holdout=run(2)).causes[0]
+    listed = {cause.effect, *(e.effect for e in cause.equivalents)}
+    assert {"torque_offset", "coulomb_asymmetry", "base_tilt"} <= listed
+    assert cause.probability > 0.8
 
 
 def test_a_clean_log_has_no_gap(clean):

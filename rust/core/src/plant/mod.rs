@@ -178,6 +178,12 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         self.has_hysteresis
     }
 
+    /// Whether the plant has states that no encoder measures: those of transmissions, or of hysteresis.
+    #[inline]
+    pub fn has_latent_states(&self) -> bool {
+        self.drivetrain.any() || self.has_hysteresis
+    }
+
     /// Hysteresis states of the joints, N m (N), after they have moved to the positions `q` from the positions `latent.anchor`.
     #[inline]
     pub fn memory(&self, q: &SVector<T, N>, latent: &LatentState<T, N>) -> SVector<T, N> {

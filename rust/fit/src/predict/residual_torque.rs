@@ -45,7 +45,7 @@ pub fn inverse_dynamics_residuals<A: Arm<f64, N, P>, const N: usize, const P: us
     let held = model.command(&track.t, &track.held, pushes, &track.tables);
     let held = held.as_deref().unwrap_or(&track.held);
     let plant = model.plant(arm)?;
-    let has_latent = plant.drivetrain().any() || plant.has_hysteresis();
+    let has_latent = plant.has_latent_states();
     let latent = has_latent.then(|| latent_states(track, &plant, held, track.len() - 1));
     let widths = std::array::from_fn(|j| plant.rounding(j).max(slow));
     let soft = plant.with_rounding(widths);

@@ -244,7 +244,7 @@ impl<const N: usize> Dataset<N> {
     ) -> Vec<Option<Vec<LatentState<f64, N>>>> {
         let of = |(index, track): (usize, &Track<N>)| {
             let last = self.windows.iter().filter(|w| w.track == index).map(|w| w.first).max()?;
-            if !plant.drivetrain().any() && !plant.has_hysteresis() {
+            if !plant.has_latent_states() {
                 return None;
             }
             let torque = commands[index].as_deref().unwrap_or(&track.held);

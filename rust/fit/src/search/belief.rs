@@ -60,7 +60,7 @@ pub fn name<const N: usize, const P: usize>(
     let effect = best.effect.unwrap_or_else(|| unreachable!("only effects are named"));
     let probability = match ground {
         Ground::Motion => probability(node, choice, &listed, seed),
-        Ground::Trust => trust_probability(node, choice),
+        Ground::Trust => trust_probability(node, choice, &listed),
     };
     let look_alikes = listed.iter().filter_map(|i| node.candidates[*i].effect).collect();
     Cause {
@@ -116,9 +116,13 @@ pub fn probability_over<const P: usize>(one: &Candidate<P>, other: &Candidate<P>
     (wins as f64 + 0.5) / (RESAMPLES as f64 + 1.0)
 }
 
-/// Probability of the effect of candidate `choice`, or one that gives the same motion under any torques, among all candidate effects, from the prior
-/// costs with each (squared distances of the parameters from their prior values, in sigmas).
-fn trust_probability<const N: usize, const P: usize>(node: &SearchNode<N, P>, choice: usize) -> f64 {
+/// Probability of the effect of candidate `choice`, of one of its look-alikes `listed`, or of one that gives the same motion under any torques, among
+/// all candidate effects, from the prior costs with each (squared distances of the parameters from their prior values, in sigmas).
+fn trust_probability<const N: usize, const P: usize>(
+    node: &SearchNode<N, P>,
+    choice: usize,
+    listed: &[usize],
+) -> f64 {
     let of = |c: &Candidate<P>| c.fit.prior_cost / node.prior_inflation();
     let best = of(&node.candidates[choice]);
     let free = |c: &Candidate<P>| c.effect.as_ref().map_or(0, EffectInstance::len) as f64;
@@ -130,7 +134,7 @@ fn trust_probability<const N: usize, const P: usize>(node: &SearchNode<N, P>, ch
             continue;
         }
         all += mass(candidate);
-        if i == choice || node.are_equivalent(i, choice) {
+        if i == choice || listed.contains(&i) || node.are_equivalent(i, choice) {
             ours += mass(candidate);
         }
     }
