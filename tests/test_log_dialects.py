@@ -270,3 +270,9 @@ def test_a_span_to_be_left_out_names_a_log_or_its_file(name, left, seed_log):
     corrected = Corrections(skip=(f"{name}:0-0.5",)).on_log(seed_log)
     assert (len(corrected) < len(seed_log)) == left
     assert ("--skip" in said(corrected, "corrected")) == left
+
+
+def test_torques_on_a_clock_in_another_unit_last_as_long_as_the_positions(frame):
+    log = Log.from_frame(frame.select("q1", "tau1", (pl.col("t") * 1e3).alias("t [ms]"), t_tau="t"))
+    assert "last as long" in said(log, "units")
+    assert np.mean(log.tau[:, 0] == frame["tau1"].to_numpy()[-len(log) :]) > 0.9

@@ -34,6 +34,8 @@ _LONGEST_PERIOD_S = 0.2
 _SHORTEST_PERIOD_S = 2e-5
 # Range of time stamps since 1970 [s], the years 2001 to 2096, by which a unit of time is recognised from the magnitude alone.
 _EPOCH_S = (1e9, 4e9)
+# Ratio of the spans of torques and positions beyond which their times are in different units: units differ by 1000.
+_SPAN_FACTOR = 10.0
 # Longest time for which a torque is held, in its own sample periods.
 _HELD_PERIODS = 3.0
 # Largest number of times per finding that are kept for charts.
@@ -67,7 +69,7 @@ def in_seconds(
     if raw.t_tau is None or names.t_tau is None:
         t = _seconds(raw.t, raw.t[0], factor)
         return Arrays(t, raw.q, raw.tau, raw.dq, raw.q_ref, raw.dq_ref, raw.tau_meas, raw.q_link), findings
-    tau_factor = raw.tau_tick_s or scales.t_tau or _tau_unit(raw.t_tau, factor, names.t_tau, findings)
+    tau_factor = raw.tau_tick_s or scales.t_tau or _tau_unit(raw.t_tau, raw.t, factor, names.t_tau, findings)
     start, tau_start = raw.t[0], raw.t_tau[0]
     # Both clocks have the same zero; from here on, times of both count from the time of the first position.
     offset = _difference(tau_start, start, tau_factor, factor)
@@ -81,7 +83,7 @@ def ticks(raw: Raw, scales: Scales, names: Names, arm: Arm | None, place: Path |
     factor = raw.tick_s or scales.t or _unit(raw.t, names.t, arm, place, [])
     if raw.t_tau is None or names.t_tau is None:
         return {"t": factor}
-    tau_factor = raw.tau_tick_s or scales.t_tau or _tau_unit(raw.t_tau, factor, names.t_tau, [])
+    tau_factor = raw.tau_tick_s or scales.t_tau or _tau_unit(raw.t_tau, raw.t, factor, names.t_tau, [])
     return {"t": factor, "t_tau": tau_factor}
 
 
@@ -126,13 +128,27 @@ def _unit(times: Times, name: str, arm: Arm | None, place: Path | str, findings:
     raise UnitError(f"the median sample period is {period:g} s, {against}", remedy=remedy, file=place, column=name)
 
 
-def _tau_unit(times: Times, factor: float, name: str, findings: list[Finding]) -> float:
-    """Return the seconds per unit of the torques' times: that of the positions' times unless the stamps contradict it."""
+def _tau_unit(times: Times, positions: Times, factor: float, name: str, findings: list[Finding]) -> float:
+    """Return the seconds per unit of the torques' times: that of the positions' times unless the stamps, or the spans of both, contradict it."""
     for unit, seconds in FACTORS["t"].items():
         if _is_epoch(times, unit) and seconds != factor and not _is_epoch(times, _named(factor)):
             findings.append(Finding("units", f"the torques' times `{name}` are stamps in {unit}; converted"))
             return seconds
-    return factor
+    span, own = (float(x[-1] - x[0]) for x in (positions, times))
+    alike = [
+        unit
+        for unit, seconds in FACTORS["t"].items()
+        if 1.0 < _SPAN_FACTOR * own * seconds / (span * factor) < _SPAN_FACTOR**2
+    ]
+    if len(alike) != 1 or FACTORS["t"][alike[0]] == factor:
+        return factor
+    findings.append(
+        Finding(
+            "units",
+            f"the torques' times `{name}` are in {alike[0]}: they then last as long as the positions; converted",
+        )
+    )
+    return FACTORS["t"][alike[0]]
 
 
 def _named(factor: float) -> str:
