@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -139,3 +140,22 @@ def test_no_drive_has_a_level_of_zero(arm: Arm) -> None:
     seldom = replace(log, tau=np.where(np.arange(len(log))[:, None] % 10 < 3, log.tau, 0.0))
     assert np.all(drive_limit.delivered([seldom], arm).levels > 0)
     assert np.isinf(drive_limit.delivered([replace(log, tau=np.zeros_like(log.tau))], arm).levels).all()
+
+
+def test_levels_are_tried_downwards_until_one_explains_less_than_no_limit() -> None:
+    log = Log.from_frame(
+        {"t": np.arange(100) * 0.01, "q": np.sin(np.arange(100) * 0.1), "tau": np.linspace(-10.0, 10.0, 100)}
+    )
+    tried: list[float] = []
+
+    def found(share: Callable[[float], float]) -> float:
+        tried.clear()
+        return drive_limit.at_best_level(lambda x: tried.append(x) or x, [log], 0, share, 0.5)
+
+    assert found(lambda level: 0.5 + 0.01 * (10.0 - level)) == max(tried)
+    assert len(tried) == 1
+    assert found(lambda level: 0.01 + abs(level - 2.3) / 20.0) == pytest.approx(2.3, abs=0.05)
+    assert len(tried) > 10
+    # A level that is far from acceptable is not refined.
+    found(lambda level: 0.45 + abs(level - 2.3) / 200.0)
+    assert len(tried) == 11

@@ -230,8 +230,8 @@ def screen(base: EquationError, logs: Sequence[Log], arm: Arm) -> tuple[Delivere
     stands = as_commanded(base, *bounds(arm))
     fits = [_fit(reading, base, logs, arm) for reading in tried]
     if all(fit.limits_tried.any() for fit in (stands, *fits)):
-        stands = delivered(logs, arm)
-        fits = [_fit(reading, base, logs, arm, limits=True) for reading in tried]
+        stands = delivered(logs, arm, rows=base.rows)
+        fits = [_fit(reading, base, logs, arm, fit.errors.rows) for reading, fit in zip(tried, fits, strict=True)]
     gains = [stands.fit.cost - fit.fit.cost for fit in fits]
     suspects = [
         Suspect(reading, fit.fit, gain, fit.closeness, fit.unexplained)
@@ -241,10 +241,12 @@ def screen(base: EquationError, logs: Sequence[Log], arm: Arm) -> tuple[Delivere
     return stands, sorted(suspects, key=lambda s: -s.gain)
 
 
-def _fit(reading: Reading, base: EquationError, logs: Sequence[Log], arm: Arm, *, limits: bool = False) -> Delivered:
+def _fit(
+    reading: Reading, base: EquationError, logs: Sequence[Log], arm: Arm, rows: Sequence[Rows] | None = None
+) -> Delivered:
     """Return the fit to logs and arm file that are corrected for the one defect that a reading supposes, such as a reversed sign.
 
-    `base` is the equation error of the logs as they stand; with `limits` drives may deliver less than they are commanded.
+    `base` is the equation error of the logs as they stand. With the `rows` of the corrected logs drives may deliver less than they are commanded.
     """
     low, high = bounds(arm)
     if reading.corrections.gravity is not None:
@@ -254,8 +256,8 @@ def _fit(reading: Reading, base: EquationError, logs: Sequence[Log], arm: Arm, *
         else:
             low[weights] = high[weights] = 0.0
     read = [reading.corrections.on_log(log) for log in logs]
-    if limits:
-        return delivered(read, arm, low, high, stands=base)
+    if rows is not None:
+        return delivered(read, arm, low, high, stands=base, rows=rows)
     if reading.corrections.gravity is not None:
         return as_commanded(base, low, high)
     return as_commanded(EquationError([Rows.of(log, arm) for log in read], arm, base.scale), low, high)

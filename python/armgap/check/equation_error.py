@@ -236,11 +236,13 @@ class EquationError:
         left = square - 2.0 * moment @ theta + np.einsum("i,jil,l->j", theta, self.gram, theta)
         return Fit(theta, np.maximum(left, 0.0) / scale)
 
-    def with_rows(self, rows: Sequence[Rows]) -> EquationError:
-        """Return the equation error of rows that differ in the torques alone."""
+    def with_rows(self, rows: Sequence[Rows], joint: int) -> EquationError:
+        """Return the equation error of rows that differ in the torques of one joint (from 0) alone."""
         other = copy(self)
         other.rows = tuple(rows)
-        other.moment, other.square = self._moments([r.y for r in rows])
+        other.moment, other.square = self.moment.copy(), self.square.copy()
+        other.moment[joint] = sum(r.y[:, joint] @ r.psi[:, joint] for r in rows) / max(self.count, 1)
+        other.square[joint] = sum(r.y[:, joint] @ r.y[:, joint] for r in rows) / max(self.count, 1)
         other.scale = np.maximum(np.maximum(other.square, other.terms), 1e-30)
         return other
 
@@ -288,14 +290,17 @@ def bounds(arm: Arm, factor: float = _TRUST_FACTOR) -> tuple[Array, Array]:
 
 
 def _bounded(gram: Array, moment: Array, low: Array, high: Array) -> Array:
-    """Minimise ``x' gram x / 2 - moment' x`` between bounds by active sets (Stark and Parker 1995); `gram` has a diagonal of one or zero."""
+    """Minimise ``x' gram x / 2 - moment' x`` between bounds by active sets (Stark and Parker 1995); `gram` has a diagonal of one or zero.
+
+    The first active set is that of the minimum without bounds.
+    """
     gram = gram + _RIDGE * np.eye(len(moment))
-    x = np.clip(np.zeros(len(moment)), low, high)
-    free = np.ones(len(moment), dtype=bool)
+    x: Array = np.clip(np.linalg.solve(gram, moment), low, high)
+    free = (x > low) & (x < high)
     for _ in range(_MOST_ROUNDS * len(moment)):
         target = x.copy()
-        held = ~free
-        target[free] = np.linalg.solve(gram[np.ix_(free, free)], moment[free] - gram[np.ix_(free, held)] @ x[held])
+        rows = gram[free]
+        target[free] = np.linalg.solve(rows[:, free], moment[free] - rows[:, ~free] @ x[~free])
         step, blocked = _step_within(x, target, low, high, free)
         x = x + step * (target - x)
         if blocked is not None:

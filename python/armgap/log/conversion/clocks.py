@@ -134,11 +134,11 @@ def _tau_unit(times: Times, positions: Times, factor: float, name: str, findings
         if _is_epoch(times, unit) and seconds != factor and not _is_epoch(times, _named(factor)):
             findings.append(Finding("units", f"the torques' times `{name}` are stamps in {unit}; converted"))
             return seconds
-    span, own = (float(x[-1] - x[0]) for x in (positions, times))
+    lasts, torques_last = (float(x[-1] - x[0]) for x in (positions, times))
     alike = [
         unit
         for unit, seconds in FACTORS["t"].items()
-        if 1.0 < _SPAN_FACTOR * own * seconds / (span * factor) < _SPAN_FACTOR**2
+        if lasts * factor / _SPAN_FACTOR < torques_last * seconds < _SPAN_FACTOR * lasts * factor
     ]
     if len(alike) != 1 or FACTORS["t"][alike[0]] == factor:
         return factor
