@@ -218,7 +218,7 @@ class Corrections:
             for values in _of(columns, _FACTORS[match[1]]):
                 values[:, slice(None) if match[2] is None else int(match[2]) - 1] *= value
         if about_log.skip:
-            keep = ~self._skipped(log)
+            keep = ~about_log._skipped(log)
             if not keep.any():
                 raise OptionError(f"--skip leaves nothing of {log.name}", remedy="leave out less")
             columns = {name: None if x is None else x[keep] for name, x in columns.items()}
@@ -253,9 +253,9 @@ class Corrections:
                     values[:, j] += sign * values[:, j - 1]
 
     def _skipped(self, log: Log) -> Any:
-        """Return a mask of the samples that the correction `skip` leaves out."""
+        """Return a mask of the samples within the spans of `skip`, which are all of this log."""
         skipped = np.zeros(len(log), dtype=bool)
-        for span in self.spans_of(log):
+        for span in self.skip:
             match = _SPAN.fullmatch(span)
             assert match is not None
             skipped |= (log.t >= float(match["first"])) & (log.t <= float(match["last"]))

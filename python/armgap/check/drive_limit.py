@@ -59,8 +59,8 @@ _SLEW_TIMES = tuple(0.05 * 1.25**k for k in range(25))
 # not driven, as the passive joint of an acrobot, has no torque to be explained.
 DRIVEN = 0.1
 # Ratio of unexplained shares within a level of torque and without one from which no smaller level is tried; where the level is the largest
-# command the ratio is one but for rounding. Without a limit the share rises by 0.4 to 5 % within the 95 % quantile; of 60 limits that halve the
-# share none would be missed so (17 development cases).
+# command the ratio is one but for rounding. Without a limit the share rises by up to 3 % within the 95 % quantile (sample case); of 60 limits that
+# halve the share none would be missed so (17 development cases).
 _WORSE = 1.001
 # Ratio of a level's unexplained share to the largest acceptable one up to which it is refined; the largest of 60 that were accepted was 1.06.
 _REFINED = 2.0

@@ -21,7 +21,18 @@ from armgap.progress import report_progress
 if TYPE_CHECKING:
     from armgap.arm.arm import Arm
 
-__all__ = ["OPTIONAL", "Arrays", "Names", "Raw", "extract", "left_out", "no_controller", "resolve", "unknown_unit"]
+__all__ = [
+    "OPTIONAL",
+    "Arrays",
+    "Names",
+    "Raw",
+    "extract",
+    "group_of",
+    "left_out",
+    "no_controller",
+    "resolve",
+    "unknown_unit",
+]
 
 _CANONICAL = re.compile(r"^(t|t_tau|(q|tau|dq|tau_meas|q_link|q_ref|dq_ref)(?P<joint>[1-9][0-9]*))$")
 _TIMES = ("t", "t_tau")
@@ -369,9 +380,14 @@ def _pick(index: Index, names: Mapping[str, str], key: str, within: str | None) 
     return found
 
 
+def group_of(key: str) -> str:
+    """Return the group whose units a standard name has: ``tau`` for ``tau_meas1``, ``t`` for ``t_tau``."""
+    return key.rstrip("0123456789").partition("_")[0]
+
+
 def unknown_unit(column: str, unit: str, key: str, place: Path | str, *, mapped: bool) -> UnitError:
     """Return the error for a column whose stated unit is not known; with `mapped` the column is already mapped to the standard name `key`."""
-    group = key.rstrip("0123456789").partition("_")[0]
+    group = group_of(key)
     mapping = "" if mapped else f"--columns {key}='{column}' "
     declared = {"t": "t=s", "q": "q=rad", "dq": "dq=rad/s", "tau": "tau=Nm"}[group]
     factor = f" and a factor with --factor {key}=VALUE" if group == "tau" else ""

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armgap.errors import OptionError, UnitError
-from armgap.log.conversion.columns import Arrays, Names, unknown_unit
+from armgap.log.conversion.columns import Arrays, Names, group_of, unknown_unit
 from armgap.log.conversion.turns import TURN, unwrapped
 from armgap.log.findings import Finding
 
@@ -93,8 +93,7 @@ def stated(names: Names, declared: Mapping[str, str], arm: Arm | None, place: Pa
     by_user = {group: _factor(group, unit, arm) for group, unit in declared.items()}
     groups = {"t": (names.t,), "q": names.q, "tau": names.tau, "dq": names.dq or ()}
     for key, column in names.pairs:
-        group = "t" if key in ("t", "t_tau") else key.rstrip("0123456789").partition("_")[0]
-        if column in names.foreign_units and group not in by_user:
+        if column in names.foreign_units and group_of(key) not in by_user:
             raise unknown_unit(column, names.foreign_units[column], key, place, mapped=True)
     findings: list[Finding] = []
     settled = set(by_user)
@@ -264,7 +263,7 @@ def in_file(
         group = key.rstrip("0123456789")
         j = 0 if key in ticks else int(key[len(group) :]) - 1
         factor = ticks[key] if key in ticks else float(groups[group][j])
-        found[key] = _named(group.partition("_")[0], factor, names.units.get(column), arm, j)
+        found[key] = _named(group_of(key), factor, names.units.get(column), arm, j)
     return found
 
 

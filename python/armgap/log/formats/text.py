@@ -30,6 +30,7 @@ _SEPARATORS = (",", ";", "\t")
 _COMMENTS = ("#", "%", "//")
 _COMMA = re.compile(r"(?:^|[;\s\"])[+-]?\d*,\d+(?:[eE][+-]?\d+)?(?:$|[;\s\"])")
 _POINT = re.compile(r"(?:^|[;\s\"])[+-]?\d*\.\d+(?:[eE][+-]?\d+)?(?:$|[;\s\"])")
+_MISSING = ("", "NA", "null")  # spellings of a missing value
 _BLOCK = 100_000  # lines that are parsed at once
 _PROGRESS_LINES = 10_000  # lines between two updates of the number of bytes read
 _SAMPLE = 1000  # lines by which decimal commas are recognised
@@ -213,11 +214,11 @@ def _add(table: _Table, block: list[str], dialect: _Dialect, lines: _Lines, path
 
 def _drop_torn(table: _Table, block: list[str], dialect: _Dialect) -> None:
     """Remove a last line of a text table that was not completely written."""
-    cells = block[-1].split(dialect.separator)
-    ends_in_number = _is_number(cells[-1], dialect.separator) or not _is_number(
-        block[0].split(dialect.separator)[-1], dialect.separator
+    first, last = (line.split(dialect.separator) for line in (block[0], block[-1]))
+    whole = last[-1].strip() in _MISSING[1:] or _is_number(last[-1], dialect.separator)
+    torn = '"' not in block[-1] and (
+        len(last) < dialect.width or (_is_number(first[-1], dialect.separator) and not whole)
     )
-    torn = '"' not in block[-1] and (len(cells) < dialect.width or not ends_in_number)
     if torn and table.rows + len(block) > 1:
         del block[-1]
         table.findings.append(Finding("cleaned", "the last row was cut short while it was written; it is left out"))
@@ -251,7 +252,7 @@ def _parse(block: list[str], dialect: _Dialect, path: Path) -> pl.DataFrame:
             separator=dialect.separator,
             decimal_comma=dialect.decimal_comma,
             infer_schema_length=None,
-            null_values=["", "NA", "null"],
+            null_values=list(_MISSING),
         )
     except (Exception, pl.exceptions.PanicException) as error:
         raise LogReadError(
