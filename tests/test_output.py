@@ -173,7 +173,9 @@ def test_a_full_disk_leaves_what_was_there(name, seed_log, tmp_path):
 def test_a_signal_in_the_middle_of_writing_leaves_nothing(number, tmp_path):
     """The status is that of a program that the signal ended."""
     code = (
+        # Under nohup, or in the background of a shell, these signals are ignored by every child.
         "import signal, sys, time; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        "signal.signal(signal.SIGHUP, signal.SIG_DFL)\n"
         "import armgap.cli.bench as bench\n"
         "from armgap.files.output import write\n"
         "def slow(path):\n    path.write_text('half'); print('now', flush=True); time.sleep(60)\n"
