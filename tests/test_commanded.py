@@ -13,7 +13,7 @@ import pytest
 from armgap import Arm, Log, diagnose, identify
 from armgap.arm.controller import Controller
 from armgap.check import Corrections, data_checks
-from armgap.check.serial import contradictions
+from armgap.check.serial.contradictions import contradictions
 from armgap.diagnosis.prepared_input import split
 from armgap.errors import ArmFileError, ColumnError, UnitError
 from armgap.log.stretches import choose

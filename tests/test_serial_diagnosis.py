@@ -13,7 +13,7 @@ import pytest
 
 from armgap import Arm, CustomEffect, Diagnosis, Log, diagnose, simulate
 from armgap.check import Corrections
-from armgap.check.serial import contradictions
+from armgap.check.serial.contradictions import contradictions
 from armgap.errors import LogShapeError, OptionError
 from armgap.fleet import read_manifest, run_fleet
 from armgap.report import diagnosis_document, diagnosis_report

@@ -18,6 +18,7 @@ __all__ = [
     "ChainStage",
     "Filters",
     "GapOutcome",
+    "GravityCorrection",
     "Scheme",
     "Side",
     "Status",
@@ -36,6 +37,7 @@ Side = Literal["motor", "link", "unknown"]
 TauKind = Literal["command", "measured"]
 CauseStatus = Literal["gone", "unseen", "undecided", "new", "smaller", "larger", "unchanged", "renamed"]
 GapOutcome = Literal["smaller", "larger", "unchanged", "none"]
+GravityCorrection = Literal["reversed", "compensated", "standard"]
 ChainStage = Literal["drive", "transmission", "mechanics", "sensor"]
 
 SERIAL = "serial"

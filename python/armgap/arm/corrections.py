@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 import numpy as np
 
 from armgap.errors import ColumnError, OptionError
+from armgap.literals import GravityCorrection
 from armgap.log.findings import Finding, counted
 from armgap.log.log import SIGNALS
 
@@ -20,9 +21,8 @@ if TYPE_CHECKING:
     from armgap.arm.arm import Arm
     from armgap.log.log import Log
 
-__all__ = ["CORRECTIONS", "Corrections", "GravityCorrection", "PositionUnit"]
+__all__ = ["CORRECTIONS", "Corrections", "PositionUnit"]
 
-GravityCorrection = Literal["reversed", "compensated"]
 PositionUnit = Literal["deg", "turns"]
 
 _COLUMN = re.compile(r"(q|dq|tau|q_link|tau_meas)([1-9]\d*)")
@@ -49,6 +49,8 @@ _SHIFTED = ("tau", "moment")
 _ANGLE = re.compile(r"(?P<number>[-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(?P<unit>deg|rad|m|turns)?")
 _ANGLE_UNITS = {"deg": math.pi / 180, "rad": 1.0, "m": 1.0, "turns": 2 * math.pi, None: 1.0}
 _SPAN = re.compile(r"(?:(?P<log>.+):)?(?P<first>[\d.]+)-(?P<last>[\d.]+)")
+# Standard acceleration of gravity in the frame of the base [m/s^2].
+_STANDARD_GRAVITY = np.array([0.0, 0.0, -9.81])
 # Standard deviation [SI] of gravity parameters that are known to be zero.
 _NO_GRAVITY_SIGMA = 1e-9
 
@@ -77,9 +79,10 @@ class Corrections:
         Factors from torque columns to torques [N m or N]; velocities are not scaled.
     shift : mapping of str to float
         ``{"tau": s}``: seconds to be added to the times of all torques.
-    gravity : {"reversed", "compensated"}, optional
+    gravity : {"reversed", "compensated", "standard"}, optional
         ``"reversed"``: gravity acts the other way than the arm file says; ``"compensated"``: logged torques lack the part
-        that carries the arm's weight, or the arm moves in a horizontal plane.
+        that carries the arm's weight, or the arm moves in a horizontal plane; ``"standard"``, for serial arms: 9.81 m/s^2 against the z axis of
+        the base.
     unit : {"deg", "turns"}, optional
         Unit of all positions; None for rad.
     skip : tuple of str
@@ -127,7 +130,7 @@ class Corrections:
         given = {name: value for name, value in values.items() if value}
         gravity = given.get("gravity")
         if gravity is not None and gravity not in get_args(GravityCorrection):
-            raise OptionError(f"gravity cannot be `{gravity}`", remedy="write reversed or compensated")
+            raise OptionError(f"gravity cannot be `{gravity}`", remedy="write reversed, compensated or standard")
         unit = given.get("unit")
         if unit is not None and unit not in get_args(PositionUnit):
             raise OptionError(f"positions cannot be in `{unit}`", remedy="write deg or turns")
@@ -271,13 +274,25 @@ class Corrections:
         return tuple(span for span, match in matches if match is not None and of_it(match["log"]))
 
     def on_arm(self, arm: Arm) -> Arm:
-        """Return the arm with gravity corrected: reversed or compensated."""
+        """Return the arm with gravity corrected: reversed, compensated, or the standard one.
+
+        Raises
+        ------
+        OptionError
+            If standard gravity is asked for an arm whose gravity parameters do not follow from its masses.
+        """
         if self.gravity is None:
             return arm
         if arm.chain is not None:
-            gravity = -1.0 * arm.chain.gravity if self.gravity == "reversed" else np.zeros(3)
+            by_name = {"reversed": -1.0 * arm.chain.gravity, "compensated": np.zeros(3), "standard": _STANDARD_GRAVITY}
+            gravity = by_name[self.gravity]
             chain = replace(arm.chain, gravity=gravity)
             return replace(arm, chain=chain, gravity=float(np.linalg.norm(gravity)))
+        if self.gravity == "standard":
+            raise OptionError(
+                f"gravity cannot be `standard` for an arm of kind `{arm.kind}`, whose parameters hold it",
+                remedy="give its gravity parameters in the arm file",
+            )
         theta, sigma = arm.theta.copy(), arm.sigma.copy()
         weights = arm.gravity_parameters
         if self.gravity == "reversed":

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armgap.arm.arm import Arm
 from armgap.check.check import Check
@@ -14,7 +13,7 @@ from armgap.check.drive_limit import deliver, delivered
 from armgap.check.equation_error import EquationError, Rows, bounds
 from armgap.log.log import SIGNALS, Log
 
-__all__ = ["find", "without_constant"]
+__all__ = ["MISFIT_RATIO", "SHARE", "Run", "constant_torques", "dead", "find", "merged", "without_constant"]
 
 Run = tuple[int, int, int]
 """Joint (from 0), and the first and last sample of a stretch in which the joint's torque does not change."""
@@ -23,8 +22,8 @@ _SHORTEST_S = 0.4
 # Time after which the filters' transient has faded [s], six of their time constants.
 _FORGOTTEN_S = 0.2
 # Ratio of the mean square residual of the equation of motion in a dead stretch to that elsewhere, and residual as a share of the joint's torque.
-_MISFIT_RATIO = 25.0
-_SHARE = 0.1
+MISFIT_RATIO = 25.0
+SHARE = 0.1
 # Largest time [s] between the beginnings of stretches of constant torque that are judged together, by rows outside of all stretches.
 _TOGETHER_S = 16.0
 # Part of a log outside stretches of constant torque from which the limits of the drives, and shifts, are estimated without these stretches.
@@ -35,7 +34,7 @@ _MIN_STRETCH_ROWS = 30
 
 def find(logs: Sequence[Log], arm: Arm) -> list[Check]:
     """Return one check per stretch of a log whose torque was not recorded."""
-    runs = [_runs(log) for log in logs]
+    runs = [constant_torques(log) for log in logs]
     if not any(runs):
         return []
     levels = delivered([without_constant(log) for log in logs], arm).levels
@@ -49,7 +48,7 @@ def find(logs: Sequence[Log], arm: Arm) -> list[Check]:
 def without_constant(log: Log) -> Log:
     """Return a log without stretches of constant torque of any joint, which may be dead; the log itself where they are half of it or more."""
     kept = np.ones(len(log), dtype=bool)
-    for _, first, last in _runs(log):
+    for _, first, last in constant_torques(log):
         kept[first : last + 1] = False
     if kept.all() or kept.mean() <= _LEAST_KEPT:
         return log
@@ -57,7 +56,7 @@ def without_constant(log: Log) -> Log:
     return replace(log, **arrays)
 
 
-def _runs(log: Log) -> list[Run]:
+def constant_torques(log: Log) -> list[Run]:
     """Return the stretches of a log in which a joint's torque does not change although it does elsewhere."""
     return [(j, first, last) for j in range(log.n_joints) for first, last in _constant(log, j)]
 
@@ -106,25 +105,27 @@ def _judged(log: Log, rows: Rows, arm: Arm, runs: list[Run], near: list[Run]) ->
         alive &= (when < log.t[first]) | (when > log.t[last] + _FORGOTTEN_S)
     if alive.sum() < _MIN_STRETCH_ROWS:
         return []
-    outside = Rows(rows.psi[alive], rows.y[alive], rows.samples[alive])
-    base = EquationError([outside], arm)
+    known = Rows(rows.psi[alive], rows.y[alive], rows.samples[alive])
+    base = EquationError([known], arm)
     residual = rows.y - rows.psi @ base.fit(*bounds(arm)).theta
     checks = []
     for j, first, last in near:
         inside = dead[:, j] & (rows.samples >= first) & (rows.samples <= last)
         if inside.sum() < _MIN_STRETCH_ROWS:
             continue
-        within = float(np.mean(residual[inside, j] ** 2))
-        if within > _MISFIT_RATIO * float(np.mean(residual[alive, j] ** 2)) and within > _SHARE * float(base.scale[j]):
-            checks.append(_check(log, j, first, last, within, residual[alive, j]))
-    return _merged(checks)
+        within, outside = (float(np.mean(residual[part, j] ** 2)) for part in (inside, alive))
+        if within > MISFIT_RATIO * outside and within > SHARE * float(base.scale[j]):
+            checks.append(dead(log, (j, first, last), within, outside))
+    return merged(checks)
 
 
-def _check(log: Log, j: int, first: int, last: int, within: float, outside: NDArray[np.float64]) -> Check:
+def dead(log: Log, run: Run, within: float, outside: float) -> Check:
+    """Return the check of a dead stretch, from the mean squares of the missing torque `within` and `outside` the stretch [N^2 m^2 or N^2]."""
+    j, first, last = run
     begins, ends = float(log.t[first]), float(log.t[last])
     message = (
         f"`tau{j + 1}` stays at {log.tau[first, j]:.4g} from {begins:.4g} to {ends:.4g} s while the joint moves as if driven: the "
-        f"torque that is missing there is {np.sqrt(within):.3g} (RMS), elsewhere {np.sqrt(float(np.mean(outside**2))):.2g}"
+        f"torque that is missing there is {np.sqrt(within):.3g} (RMS), elsewhere {np.sqrt(outside):.2g}"
     )
     remedy = f"--skip {log.recording}:{begins:.4g}-{ends:.4g}"
     return Check(
@@ -138,7 +139,7 @@ def _check(log: Log, j: int, first: int, last: int, within: float, outside: NDAr
     )
 
 
-def _merged(checks: list[Check]) -> list[Check]:
+def merged(checks: list[Check]) -> list[Check]:
     """Return one check per dead stretch: of several joints whose torques are missing over the same rows, only that of the first."""
     by_rows: dict[tuple[tuple[int, int], ...], list[Check]] = {}
     for check in checks:

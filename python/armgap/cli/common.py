@@ -10,13 +10,14 @@ from collections.abc import Callable, Mapping
 from contextvars import copy_context
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
+from typing import TYPE_CHECKING, Any, NoReturn, TypeVar, get_args
 
 import click
 from rich.console import Console
 
 from armgap.cli.files import Command, InputFile, OutputFile, Words
 from armgap.errors import OptionError
+from armgap.literals import GravityCorrection
 
 if TYPE_CHECKING:
     from armgap.arm.arm import Arm
@@ -91,10 +92,12 @@ _CORRECTIONS = {
 
 def corrections_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add the command-line options that correct signs, zeros, units or order of a log's columns."""
-    gravity = click.Choice(["reversed", "compensated"])
-    command = click.option("--gravity", type=gravity, help="Gravity acts the other way, or torques carry no weight.")(
-        command
-    )
+    gravity = click.Choice(get_args(GravityCorrection))
+    command = click.option(
+        "--gravity",
+        type=gravity,
+        help="Gravity acts the other way, torques carry no weight, or the arm file of a serial arm leaves out gravity.",
+    )(command)
     for name, (metavar, text) in reversed(_CORRECTIONS.items()):
         command = click.option(f"--{name}", multiple=True, type=Words(), metavar=metavar, help=text)(command)
     return command

@@ -13,7 +13,8 @@ from armgap.arm.corrections import Corrections
 from armgap.check import torque_unit
 from armgap.check.check import Check
 from armgap.check.log_checks.data import copied_holdout, data_checks
-from armgap.check.serial import contradictions
+from armgap.check.serial.contradictions import contradictions
+from armgap.check.serial.dead_stretch import find as dead_stretches
 from armgap.check.stage import examine
 from armgap.diagnosis.provenance import provenance
 from armgap.errors import LogShapeError, OptionError
@@ -132,7 +133,9 @@ def _examined(given: PreparedInput, horizon: float, *, repair: bool) -> Prepared
                 file=log.path or log.name,
             )
     if given.arm.chain is not None:
-        corrections, found_in_all = contradictions([*training, *held], given.arm, repair=repair)
+        corrections, found_in_all = dead_stretches([*training, *held], given.arm)
+        if not found_in_all:
+            corrections, found_in_all = contradictions([*training, *held], given.arm, repair=repair)
         return replace(
             given,
             training=[corrections.on_log(log) for log in training],

@@ -10,6 +10,7 @@ use armgap_core::chain::Chain;
 use nalgebra::SVector;
 
 /// Model of a serial arm for simulation: the chain, its parameters and effects, position controllers, and terms on coupled joints.
+#[derive(Clone)]
 pub struct Model<const N: usize, const P: usize> {
     arm: Chain<f64, N>,
     hypothesis: Hypothesis<P>,

@@ -11,20 +11,23 @@ use crate::predict::window::Dataset;
 use crate::progress::{Phase, ProgressReporter};
 use crate::result::gap::{HORIZONS, closed, free_run_series, limited, whole, window_series};
 use crate::result::report::{
-    ArmSummary, AtHorizon, Candidate, Cause, Diagnosis, FreeRun, FreeRunSeries, Gap, LogSummary, Named,
-    Noise, OptionSummary, Parameters, Value,
+    ArmSummary, AtHorizon, Candidate, Diagnosis, FreeRun, FreeRunSeries, Gap, LogSummary, Named, Noise,
+    OptionSummary, Parameters, Value,
 };
 use crate::result::verdict::Evidence;
-use crate::serial::constants::NAMED;
 use crate::serial::controller::closed_loop::ClosedLoop;
 use crate::serial::predict::{Model, floor};
 use crate::serial::result::cause_report::{cause, ruled_out};
 use crate::serial::result::controller_report::{gains_note, with_settings};
-use crate::serial::search::Found;
 use crate::serial::search::fitting::Fitted;
+use crate::serial::search::{self, Found};
 use crate::serial::term::Term;
 use crate::serial::{SerialArm, Set};
 use armgap_core::chain::Chain;
+
+/// Reason why causes are not named beside which the arm predicts the holdout worse than the re-estimated arm.
+const PREDICTS_WORSE: &str =
+    "the arm with what was found predicts the holdout worse than the re-estimated arm does without it";
 
 /// Number of bootstrap resamples of the holdout's windows for the confidence interval of the closed share.
 const CLOSED_SHARE_RESAMPLES: usize = 500;
@@ -50,28 +53,35 @@ pub(crate) fn assemble<const N: usize, const P: usize>(
     progress.begin(Phase::Result, 6);
     let rotary = description.rotary();
     let commanded = holdout.equation.commanded.as_ref().map(|commanded| &commanded.controller);
-    let causes: Vec<Cause> = found.named.iter().map(|n| cause(n, &rotary, commanded)).collect();
-    let (named, unnamed): (Vec<Cause>, Vec<Cause>) = causes.into_iter().partition(|c| c.probability >= NAMED);
-    let why = |c: Cause| Candidate {
-        why: format!("its probability is {:.2}; from {NAMED} on a cause is named", c.probability),
-        cause: c,
-    };
-    let reported = &found.reported;
-    let models = models(description, arm, holdout, found);
+    let mut models = models(description, arm, holdout, found);
     let noise: [f64; N] = std::array::from_fn(|j| {
         crate::log::track::median(training.data.tracks.iter().map(|t| t.noise[j]).collect())
     });
     let data = &holdout.data;
-    let predicted = [0, 1, 2].map(|i| {
+    let mut predicted = [0, 1, 2].map(|i| {
         progress.unit();
         models[i].predict(data)
     });
-    let compared = Compared {
-        predicted,
-        measured: data.measured(),
-        floor: floor(data, &noise).iter().map(|v| v.sqrt()).collect(),
-        models,
-    };
+    let measured = data.measured();
+    let floor: Vec<f64> = floor(data, &noise).iter().map(|v| v.sqrt()).collect();
+    let missed = |i: usize| rms::<N>(&measured, &limited(&measured, &predicted[i]));
+    let contradicted = closed(&missed(1), &missed(2), &floor) < 0.0;
+    let why_not =
+        |n: &search::Named| n.unfit(&rotary).or_else(|| contradicted.then(|| PREDICTS_WORSE.to_owned()));
+    let (mut named, mut unnamed) = (Vec::new(), Vec::new());
+    for n in &found.named {
+        let cause = cause(n, &rotary, commanded);
+        match why_not(n) {
+            Some(why) => unnamed.push(Candidate { cause, why }),
+            None => named.push(cause),
+        }
+    }
+    let reported = if contradicted { &found.refit_feasible } else { &found.reported };
+    if contradicted {
+        models[2] = models[1].clone();
+        predicted[2] = predicted[1].clone();
+    }
+    let compared = Compared { predicted, measured, floor, models };
     let gap = gap(&compared, data, &rotary, options);
     let evidence = Evidence {
         named: !named.is_empty(),
@@ -93,7 +103,7 @@ pub(crate) fn assemble<const N: usize, const P: usize>(
         places: places(found, holdout),
         energy: Vec::new(),
         causes: named,
-        candidates: unnamed.into_iter().map(why).collect(),
+        candidates: unnamed,
         ruled_out: ruled_out(found, &unexplained(&found.model, holdout), &rotary),
         parameters: Parameters {
             nominal: parameters(&description.theta, &description.sigma),
@@ -151,7 +161,7 @@ fn models<const N: usize, const P: usize>(
 }
 
 /// Share of each joint, 0 to 1, in the squared torque that the re-estimated arm leaves unexplained on the holdout above the position noise, largest
-/// first; each joint's unexplained squared torque is first divided by the joint's whole squared torque.
+/// first; each joint's unexplained squared torque is first divided by the joint's whole squared torque. A joint without torque has no share.
 fn places<const N: usize, const P: usize>(found: &Found, holdout: &Set<N, P>) -> Vec<Location> {
     let square = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>();
     let rows = &holdout.equation.rows.joints;
@@ -159,8 +169,11 @@ fn places<const N: usize, const P: usize>(found: &Found, holdout: &Set<N, P>) ->
     let residual = holdout.equation.rows.residual(&found.refit.estimate.theta, &none);
     let left: Vec<f64> = (0..N)
         .map(|j| {
-            ((square(&residual[j]) - square(&rows[j].floor)) / square(&rows[j].y).max(f64::MIN_POSITIVE))
-                .max(0.0)
+            let whole = square(&rows[j].y);
+            if whole == 0.0 {
+                return 0.0;
+            }
+            ((square(&residual[j]) - square(&rows[j].floor)) / whole).max(0.0)
         })
         .collect();
     let total: f64 = left.iter().sum();

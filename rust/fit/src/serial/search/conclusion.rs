@@ -1,6 +1,6 @@
 //! Results of a model search: probabilities of the found terms, their look-alikes, and tests of the terms that are not in the model.
 
-use crate::serial::constants::{ALIKE, ALIKE_COST, NAMED};
+use crate::serial::constants::{ALIKE, ALIKE_COST};
 use crate::serial::search::evidence::{consequence, stability, trust};
 use crate::serial::search::fitting::Fitted;
 use crate::serial::search::screening::Guess;
@@ -32,7 +32,8 @@ impl Search<'_> {
         } else {
             self.fit(regression, Vec::new(), &refit.estimate.theta)
         };
-        let probable = named.iter().filter(|n| n.probability >= NAMED).map(|n| n.term.clone()).collect();
+        let probable =
+            named.iter().filter(|n| n.unfit(&self.rotary).is_none()).map(|n| n.term.clone()).collect();
         let reported = self.feasible(regression, self.fit(regression, probable, &model.estimate.theta));
         let refit_feasible = self.feasible(regression, refit.clone());
         Found {

@@ -4,6 +4,7 @@ pub(in crate::serial) mod arm_wide;
 pub(in crate::serial) mod conclusion;
 pub(in crate::serial) mod evidence;
 pub(in crate::serial) mod fitting;
+pub(in crate::serial) mod naming;
 pub(in crate::serial) mod screening;
 
 use crate::progress::{Phase, ProgressReporter};

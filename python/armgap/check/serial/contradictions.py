@@ -1,19 +1,16 @@
 """Contradictions between logs and arm file of a serial arm: corrected columns explain the torques where the columns as logged do not.
 
-The equation of motion of a serial arm is compared in its weak form, with raised cosines as test functions: momentum takes the place of
-accelerations. Parameters are estimated with the arm file's standard deviations as prior, friction and rotor inertias not negative. A right
-reading of the columns lowers both the unexplained torque and the distance from the arm file.
+A right reading of the columns lowers both the torque that the equation of motion (`weak_form`) leaves unexplained and the distance from the arm file.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from armgap import _native
 from armgap.arm.arm import Arm
 from armgap.arm.corrections import Corrections
 from armgap.check.check import Check
@@ -27,21 +24,13 @@ from armgap.check.readings import (
     torque_sign,
 )
 from armgap.check.readings.reading import Reading
+from armgap.check.serial.weak_form import Fit, Rows, fit
 from armgap.log.log import Log
 
 __all__ = ["contradictions"]
 
 Array = NDArray[np.float64]
 
-# Half width of a test function [s], and at least so many sample periods.
-_HALF_WIDTH_S = 0.05
-_FEWEST_PERIODS = 5
-# Largest number of sample intervals in the regression, all logs together: some ten seconds of a robot's log tell a sign.
-_MOST_INTERVALS = 4000
-# Number of rows that count as one independent row: neighbouring test functions overlap, and residuals are correlated over some tenths of a second.
-_CORRELATED = 12.0
-# Iterations in which the weights of the joints are set from their residuals.
-_WEIGHT_ITERATIONS = 4
 # Share of a joint's mean square torque that stays unexplained, from which other readings of the columns are tried. Friction that the model lacks
 # leaves up to a fifth on logs of real arms.
 _SUSPICIOUS_SHARE = 0.3
@@ -76,28 +65,6 @@ _READINGS: tuple[Callable[[Arm, float], Iterable[Reading]], ...] = (
     gravity_missing.readings,
     position_unit.readings,
 )
-
-
-@dataclass(frozen=True)
-class Fit:
-    """Result of a regression of torques on the arm's parameters.
-
-    Attributes
-    ----------
-    cost : float
-        Twice the negative log-likelihood up to a constant, plus the squared distance from the arm file.
-    share : ndarray, shape (n_joints,)
-        Part of each joint's mean square torque that stays unexplained.
-    distance : float
-        Squared distance of the parameters from the arm file in its standard deviations.
-    count : float
-        Effective number of independent rows per joint; neighbouring rows are correlated.
-    """
-
-    cost: float
-    share: Array
-    distance: float
-    count: float
 
 
 def contradictions(logs: Sequence[Log], arm: Arm, *, repair: bool = True) -> tuple[Corrections, list[Check]]:
@@ -236,70 +203,9 @@ def _offered(logs: Sequence[Log], arm: Arm) -> Iterator[Reading]:
         yield from readings(arm, travel)
 
 
-@dataclass(frozen=True)
-class _Rows:
-    """Torques `y`, shape (n_rows, n_joints), their sums of squares `square`, and the normal equations of each joint.
-
-    With `psi` the regressor of a joint, `normal` holds ``psi' psi`` and `right` holds ``psi' y``, first axis the joint.
-    """
-
-    y: Array
-    square: Array
-    normal: Array
-    right: Array
-
-    @classmethod
-    def of(cls, logs: Sequence[Log], arm: Arm) -> _Rows | None:
-        """Return torques and normal equations of given logs; None where the logs hold too few samples, or no joint has a torque."""
-        if arm.chain is None:
-            return None
-        chain = arm.chain.native()
-        most = max(_MOST_INTERVALS // len(logs), 1)
-        found = [rows for log in logs if (rows := _rows(chain, log, _torques(log, arm), most)) is not None]
-        if not found:
-            return None
-        y = np.concatenate([torque for torque, _ in found])
-        psi = np.concatenate([regressor for _, regressor in found])
-        square = (y**2).sum(axis=0)
-        if not square.any():
-            return None
-        normal = np.stack([x.T @ x for x in psi.transpose(1, 0, 2)])
-        return cls(y, square, normal, np.stack([x.T @ t for x, t in zip(psi.transpose(1, 0, 2), y.T, strict=True)]))
-
-    def fit(self, arm: Arm, factors: Array) -> Fit:
-        """Estimate the arm's parameters from torques times one factor per joint."""
-        precision = np.zeros(len(arm.sigma))
-        free = arm.sigma > 0
-        precision[free] = arm.sigma[free] ** -2.0
-        moved = self.square > 0
-        square = np.where(moved, factors**2 * self.square, 1.0)
-        count = len(self.y)
-        left = 0.01 * square
-        theta = arm.theta
-        for _ in range(_WEIGHT_ITERATIONS):
-            weights = moved * count / left / _CORRELATED
-            normal = np.einsum("j,jik->ik", weights, self.normal)
-            right = np.einsum("j,ji->i", weights * factors, self.right) + precision * arm.theta
-            normal[np.diag_indices_from(normal)] += precision
-            theta = _estimate(normal, right, arm.theta, precision == 0, arm.n_joints)
-            explained = (self.normal @ theta) @ theta - 2 * factors * (self.right @ theta)
-            left = np.maximum(square + explained, 1e-8 * square)
-        distance = float((precision * (theta - arm.theta) ** 2).sum())
-        share = np.where(moved, left / square, 0.0)
-        # The likelihood counts unexplained shares relative to one part in 10,000, below which a joint's torque counts as explained.
-        likelihood = count / _CORRELATED * float(np.log(np.maximum(share[moved], 1e-4) / 1e-4).sum())
-        return Fit(likelihood + distance, share, distance, count / _CORRELATED)
-
-
-def fit(logs: Sequence[Log], arm: Arm) -> Fit | None:
-    """Estimate the arm's parameters from the torques of logs; None where the logs hold too few samples."""
-    rows = _Rows.of(logs, arm)
-    return None if rows is None else rows.fit(arm, np.ones(arm.n_joints))
-
-
 def _factors(logs: Sequence[Log], arm: Arm) -> tuple[Array, Fit] | None:
     """Return the factor per torque for the best agreement of logs and arm file, by alternating grid searches, and its fit; None for short logs."""
-    rows = _Rows.of(logs, arm)
+    rows = Rows.of(logs, arm)
     if rows is None:
         return None
     factors = np.ones(arm.n_joints)
@@ -321,72 +227,3 @@ def _factors(logs: Sequence[Log], arm: Arm) -> tuple[Array, Fit] | None:
         if plain[1].cost < best.cost + _UNDECIDED:
             factors, best = plain
     return factors, best
-
-
-def _estimate(normal: Array, right: Array, prior: Array, fixed: NDArray[np.bool_], n_joints: int) -> Array:
-    """Solve normal equations; rotor inertias and friction are held at zero where they would be negative."""
-    held = fixed.copy()
-    value = np.where(held, prior, 0.0)
-    first = 10 * n_joints
-    for _ in range(3 * n_joints + 1):
-        go = ~held
-        value[go] = np.linalg.solve(normal[np.ix_(go, go)], right[go] - normal[np.ix_(go, held)] @ value[held])
-        negative = go & (np.arange(len(value)) >= first) & (value < 0)
-        if not negative.any():
-            break
-        held |= negative
-        value[negative] = 0.0
-    return value
-
-
-def _torques(log: Log, arm: Arm) -> Array:
-    """Return the torques of a log [N m or N]: as logged, or those of the arm's controller under the logged references."""
-    if log.has_torques or log.q_ref is None or arm.controller is None:
-        return log.tau
-    return arm.controller.torque(log.t, log.q, log.q_ref, log.dq_ref, arm.torque_limit)
-
-
-def _rows(chain: _native.Chain, log: Log, torques: Array, most: int) -> tuple[Array, Array] | None:
-    """Return torques, shape (rows, n), and regressors, shape (rows, n, 13 n), of one log in the weak form."""
-    period = float(np.median(np.diff(log.t)))
-    taps = max(round(_HALF_WIDTH_S / period), _FEWEST_PERIODS)
-    count = min(len(log) - 1, most)
-    if count < 4 * taps:
-        return None
-    begin = (len(log) - 1 - count) // 2
-    part = slice(begin, begin + count)
-    h = np.diff(log.t)[part, None]
-    q = 0.5 * (log.q[:-1] + log.q[1:])[part]
-    mean_dq = np.diff(log.q, axis=0)[part] / h
-    dq = _smoothed(mean_dq, taps // 2)
-    n = q.shape[1]
-    edge = np.arange(2 * taps + 1) / taps - 1.0
-    area = 0.5 * (edge + np.sin(np.pi * edge) / np.pi)
-    weight = np.diff(area)
-    rise = np.diff(0.5 * (1.0 + np.cos(np.pi * edge))) / (taps * period)
-    starts = np.arange(0, count - 2 * taps, max(taps // 2, 1))
-    index = starts[:, None] + np.arange(2 * taps)[None, :]
-    momentum = np.zeros((count, n, 13 * n))
-    rest = np.zeros_like(momentum)
-    q, mean_dq, dq = (np.ascontiguousarray(x) for x in (q, mean_dq, dq))
-    momentum[:, :, : 10 * n] = chain.momentum_regressor(q, mean_dq)
-    rest[:, :, : 10 * n] = chain.potential_regressor(q, dq)
-    joints = np.arange(n)
-    momentum[:, joints, 10 * n + joints] = mean_dq
-    rest[:, joints, 11 * n + joints] = dq
-    rest[:, joints, 12 * n + joints] = np.sign(dq)
-    tau = torques[:-1][part]
-    torque = np.einsum("k,wkj->wj", weight, tau[index])
-    regressor = np.zeros((len(starts), n, 13 * n))
-    for k in range(2 * taps):
-        at = starts + k
-        regressor += weight[k] * rest[at] - rise[k] * momentum[at]
-    return torque, regressor
-
-
-def _smoothed(x: Array, half: int) -> Array:
-    """Return the running mean over `half` samples to either side, shorter at the ends."""
-    total = np.concatenate([np.zeros((1, x.shape[1])), np.cumsum(x, axis=0)])
-    at = np.arange(len(x))
-    low, high = np.maximum(at - half, 0), np.minimum(at + half + 1, len(x))
-    return np.asarray((total[high] - total[low]) / (high - low)[:, None])
