@@ -15,6 +15,8 @@ __all__ = ["STAGES", "correct"]
 STAGES = ("with_causes", "refit")
 #: Relative difference up to which parameters of arm file and diagnosis count as equal.
 _EQUAL_PARAMETER_TOLERANCE = 1e-9
+#: First words of the diagnosis' remark on gains of a position controller that were estimated.
+_ESTIMATED_GAINS = "gains of the controller, estimated"
 
 
 def correct(diagnosis: Diagnosis, arm: Arm, *, stage: str = "with_causes", keep_lengths: bool = False) -> Corrected:
@@ -53,6 +55,11 @@ def correct(diagnosis: Diagnosis, arm: Arm, *, stage: str = "with_causes", keep_
         notes += (
             "the unit of the torques was taken from the arm file's masses: torques and friction are as far off as these",
         )
+    notes += tuple(
+        f"{note}; those stated are kept"
+        for note in diagnosis.extra.get("notes", ())
+        if note.startswith(_ESTIMATED_GAINS)
+    )
     if keep_lengths:
         raise ExportError("lengths of serial arms are always kept", remedy="leave out --keep-lengths", file=arm.path)
     return correct_serial(arm, stage, values, causes, notes, diagnosis)
