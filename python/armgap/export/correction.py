@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from armgap.arm.arm import Arm
+from armgap.arm.arm import Arm, checked_arm
 from armgap.diagnosis.result import Diagnosis
 from armgap.export.chain.planar import correct_planar
 from armgap.export.chain.serial import correct_serial
@@ -44,7 +44,7 @@ def correct(diagnosis: Diagnosis, arm: Arm, *, stage: str = "with_causes", keep_
     ExportError
         If the diagnosis belongs to another arm, or there is no length to keep.
     """
-    _check(diagnosis, arm, stage)
+    _check(diagnosis, checked_arm(arm), stage)
     values = [diagnosis.parameters[stage][name] for name in arm.parameter_names]
     found = diagnosis.causes if stage == "with_causes" else ()
     causes = tuple(single for cause in found for single in cause.by_joint())
