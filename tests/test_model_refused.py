@@ -10,7 +10,7 @@ import polars as pl
 import pytest
 
 from armgap import Arm, Log, read_model
-from armgap.errors import ArmgapError
+from armgap.errors import ArmgapError, ColumnError
 from three_joints import ARM, JOINTS, LINKS, URDF, motion, refused
 
 Run = Callable[..., tuple[int, str, str]]
@@ -52,7 +52,8 @@ BROKEN = [
     ("a table", URDF, "t,q1\n0,1\n", ("no XML", "<robot>"), ()),
     ("empty", URDF, "", ("no XML",), ()),
     ("no links", URDF, "<robot name='r'/>", ("no links",), ()),
-    ("an entity", '<robot name', '<!DOCTYPE robot [<!ENTITY a "b">]><robot name', ("entity",), ()),
+    ("an entity", '<robot name', '<!DOCTYPE robot [<!ENTITY a "b">]><robot name',
+     ("row 2", "declares an entity", "xmllint --noent --dropdtd"), ()),
     ("reduction of no number", "<vendor:thing", '<transmission name="t"><joint name="lift"/><actuator name="m"><mechanicalReduction>x'
      "</mechanicalReduction></actuator></transmission><vendor:thing", ("mechanicalReduction", "'x'"), ()),
     ("a kilometre too many", 'xyz="0.1 0 0.2"', 'xyz="1e300 0 0"', ("too long to compute with", "kg and m"), ("--tip", "flange")),
@@ -138,6 +139,31 @@ def test_columns_are_found_by_the_names_of_joints(three: Path) -> None:
             np.testing.assert_array_equal(log.dq[:, j], frame[f"{joint}/velocity"])
         assert [log.units[f"q{j}"] for j in (1, 2, 3)] == ["m", "rad", "rad"]
         assert [log.units[f"tau{j}"] for j in (1, 2, 3)] == ["N", "Nm", "Nm"]
+
+
+def test_stray_standard_names_do_not_hide_the_joints_columns(three: Path) -> None:
+    """One column `tau1` beside the efforts of all joints is left out, and said; it is used where it is asked for."""
+    arm, frame = Arm.read(three / "arm.toml"), motion()
+    stray = frame.with_columns(pl.lit(1.0).alias("tau1"), pl.lit(2.0).alias("dq2"))
+    log = Log.from_frame(stray, arm=arm)
+    for j, joint in enumerate(JOINTS):
+        np.testing.assert_array_equal(log.tau[:, j], frame[f"{joint}/effort"])
+    said = [finding.message for finding in log.findings if finding.kind == "columns"]
+    assert [("`tau1`" in text, "`dq2`" in text) for text in said] == [(False, True), (True, False)]
+    asked = Log.from_frame(stray.with_columns(tau1=frame["lift/effort"] + 1), arm=arm, columns={"tau1": "tau1"})
+    np.testing.assert_array_equal(asked.tau[:, 0], frame["lift/effort"] + 1)
+    np.testing.assert_array_equal(asked.tau[:, 1], frame["shoulder/effort"])
+
+
+def test_columns_by_both_names_are_refused(three: Path) -> None:
+    arm, frame = Arm.read(three / "arm.toml"), motion()
+    both = frame.with_columns(
+        (2 * pl.col(f"{joint}/effort")).alias(f"tau{j}") for j, joint in enumerate(JOINTS, start=1)
+    )
+    with pytest.raises(ColumnError, match=r"`tau1`: stands beside `lift/effort`.*joint 1.*--columns tau1=tau1"):
+        Log.from_frame(both, arm=arm)
+    standard = Log.from_frame(both, arm=arm, columns={f"tau{j}": f"tau{j}" for j in (1, 2, 3)})
+    np.testing.assert_array_equal(standard.tau, 2 * Log.from_frame(frame, arm=arm).tau)
 
 
 def test_explicit_columns_win(three: Path) -> None:

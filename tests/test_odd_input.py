@@ -5,11 +5,15 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import click
+import numpy as np
 import pytest
 
+import armgap
 from armgap import CustomEffect, Log, diagnose, simulate
 from armgap.cli.files import InputFolder, OutputFile
 from armgap.errors import OptionError
@@ -211,3 +215,26 @@ def test_names_of_any_bytes(arm_file, seed_log, tmp_path):
     folder.mkdir()
     seed_log.write(folder / "log.parquet")
     assert len(Log.read(folder / "log.parquet")) == len(seed_log)
+
+
+@pytest.mark.parametrize("arm", [3, None, {"kind": "pendulum"}, Path], ids=["number", "none", "mapping", "class"])
+def test_what_is_no_arm_is_refused(arm: Any) -> None:
+    """By every public function that takes an arm, in one line that says what an arm is."""
+    t = np.arange(100) * 0.01
+    table = {"t": t, "q1": np.sin(t), "tau1": np.cos(t)}
+    log = Log.from_frame(table)
+    calls: list[Callable[[], object]] = [
+        lambda: armgap.diagnose(table, arm),
+        lambda: armgap.fit(log, arm),
+        lambda: armgap.identify(log, arm),
+        lambda: armgap.simulate(arm, t, np.cos(t)),
+        lambda: armgap.base_parameters(arm),
+        lambda: armgap.Estimator(arm),
+        lambda: armgap.plan("gap.json", arm),
+        lambda: armgap.correct(None, arm),  # type: ignore[arg-type]
+    ]
+    if arm is not None:
+        calls += [lambda: armgap.inspect(table, arm), lambda: Log.from_frame(table, arm=arm)]
+    for call in calls:
+        with pytest.raises(OptionError, match=r"the arm is .*not an Arm; give an Arm: Arm\.read"):
+            call()

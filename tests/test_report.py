@@ -19,7 +19,7 @@ from armgap.report.advice import next_steps
 from armgap.report.sections import SECTIONS
 from armgap.report.sections.gap import first_picture
 from armgap.report.sections.motion import _whole_run
-from armgap.report.words import answers, figure, percent, value, variable_text, verdict
+from armgap.report.words import answers, figure, percent, title, value, variable_text, verdict
 from armgap.simulation import Effect
 
 LARGEST_REPORT = 5_000_000  # bytes
@@ -89,6 +89,20 @@ def test_every_verdict_answers_in_its_own_words() -> None:
     assert "No cause" in texts(data["none"])
     assert "None that the library knows" in texts(data["unexplained"])
     assert len({verdict(d) for d in data.values()}) == len(data)
+
+
+def test_a_serial_arm_without_a_cause_is_told_what_was_not_tested() -> None:
+    """Elastic joints and backlash are tested where torques are logged, and not on logs of references: the diagnosis says which."""
+    data = copy.deepcopy(cases.unexplained().to_dict())
+    data["arm"]["kind"] = "serial"
+    untested = {"status": "undecided", "why": "not tested on serial arms from such logs"}
+    data["ruled_out"] = [{"effect": "backlash", "joint": 1, "status": "absent", "why": None}]
+    data["ruled_out"] += [{"effect": "external_pulse", "joint": j, **untested} for j in (1, 2)]
+    [answer] = [a.detail for a in answers(data) if a.headline == "None that was tested"]
+    assert answer.endswith(f"none explains the gap; not tested: {title('external_pulse')}.")
+    data["ruled_out"] += [{"effect": "backlash", "joint": 2, **untested}]
+    [answer] = [a.detail for a in answers(data) if a.headline == "None that was tested"]
+    assert answer.endswith(f"not tested: {title('external_pulse')}, {title('backlash')}.")
 
 
 def test_a_doubtful_cause_is_called_so() -> None:

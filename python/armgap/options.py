@@ -8,7 +8,7 @@ from typing import Any
 
 from armgap.errors import OptionError
 
-__all__ = ["LARGEST_SEED", "positive", "seed", "whole"]
+__all__ = ["LARGEST_SEED", "not_an_arm", "positive", "seed", "whole"]
 
 LARGEST_SEED = 2**64 - 1
 """Largest seed of the compiled core's random generator, which takes 64 bits."""
@@ -57,3 +57,10 @@ def seed(value: Any) -> int:
         If the value is negative, too large or no whole number.
     """
     return whole(value, "seed", 0, LARGEST_SEED)
+
+
+def not_an_arm(arm: Any) -> OptionError:
+    """Return the error for an argument `arm` that is no `Arm`; its message names how an `Arm` is made."""
+    found = repr(arm) if isinstance(arm, str | int | float | bytes | None) else f"a {type(arm).__name__}"
+    remedy = 'give an Arm: Arm.read("arm.toml"), or read_model("robot.urdf")'
+    return OptionError(f"the arm is {found[:80]}, not an Arm", remedy=remedy)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armgap import _native, options
-from armgap.arm.arm import Arm
+from armgap.arm.arm import Arm, checked_arm
 from armgap.errors import OptionError
 from armgap.log.log import Log
 from armgap.progress import report_progress
@@ -149,6 +149,7 @@ def simulate(
     OptionError
         If a shape, an effect or a value is impossible, or the motion diverges.
     """
+    checked_arm(arm)
     seed = options.seed(seed)
     _check_effects(effects)
     t = np.ascontiguousarray(t, dtype=np.float64)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from armgap import _native
 from armgap.errors import OptionError
 from armgap.literals import SERIAL, Side, TauKind
+from armgap.options import not_an_arm
 
 if TYPE_CHECKING:
     from armgap.arm.controller import Controller
@@ -21,7 +23,7 @@ if TYPE_CHECKING:
     from armgap.arm.free_space import FreeSpace
     from armgap.arm.serial.chain import SerialChain
 
-__all__ = ["Arm", "MotionLimits", "kinds", "listed", "only_planar", "quoted"]
+__all__ = ["Arm", "MotionLimits", "arm_of", "checked_arm", "kinds", "listed", "only_planar", "quoted"]
 
 
 @dataclass(frozen=True)
@@ -311,6 +313,34 @@ class Arm:
         return lines
 
 
+def checked_arm(arm: Any) -> Arm:
+    """Return `arm` if it is an `Arm`.
+
+    Raises
+    ------
+    OptionError
+        If it is anything else; the message names how an `Arm` is made.
+    """
+    if isinstance(arm, Arm):
+        return arm
+    raise not_an_arm(arm)
+
+
+def arm_of(arm: Any) -> Arm:
+    """Return an `Arm`, or the arm of an arm file by its path.
+
+    Raises
+    ------
+    ArmFileError
+        If the arm file cannot be read.
+    OptionError
+        If `arm` is neither; the message names what is accepted.
+    """
+    if isinstance(arm, str | os.PathLike):
+        return Arm.read(Path(arm))
+    return checked_arm(arm)
+
+
 def quoted(text: str) -> str:
     """Return a text as a basic string of TOML: escaped like JSON, and DEL escaped too."""
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
@@ -337,7 +367,7 @@ def only_planar(arm: Arm, what: str) -> None:
     Raises
     ------
     OptionError
-        If the arm is a serial arm; the message names the function `what`.
+        If the arm is a serial arm, or none; the message names the function `what`.
     """
-    if arm.chain is not None:
+    if checked_arm(arm).chain is not None:
         raise OptionError(f"{what} does not take serial arms", remedy=f"give an arm of the kind {', '.join(kinds())}")

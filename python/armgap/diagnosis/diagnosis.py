@@ -7,13 +7,12 @@ import os
 import re
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Annotated, Any, Literal, TypedDict
 
 import numpy as np
 
 from armgap import _native, options
-from armgap.arm.arm import Arm
+from armgap.arm.arm import Arm, arm_of
 from armgap.arm.corrections import Corrections
 from armgap.check import torque_unit
 from armgap.check.check import Check
@@ -127,7 +126,7 @@ def diagnose(
         "seed": options.seed(seed),
     }
     check_effects(effects)
-    arm = arm if isinstance(arm, Arm) else Arm.read(Path(arm))
+    arm = arm_of(arm)
     if arm.chain is not None and effects:
         raise OptionError(
             "a serial arm's diagnosis takes no effects of your own",

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armgap.arm.arm import Arm
+from armgap.arm.arm import Arm, checked_arm
 from armgap.errors import OptionError
 
 __all__ = ["BaseParameters", "base_parameters"]
@@ -107,7 +107,7 @@ def base_parameters(arm: Arm, *, fixed: Iterable[str] = (), asymmetry: bool = Fa
     M. Gautier, Journal of Robotic Systems 8 (1991) 485-506; W. Khalil and E. Dombre, Modeling, Identification and Control of Robots,
     Hermes Penton (2002), section 9.4.
     """
-    chain = arm.chain
+    chain = checked_arm(arm).chain
     if chain is None:
         raise OptionError(
             f"the parameters of an arm of kind `{arm.kind}` are base parameters", remedy="give a serial arm"

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armgap import _native
-from armgap.arm.arm import Arm, kinds
+from armgap.arm.arm import Arm, checked_arm, kinds
 from armgap.errors import OptionError
 from armgap.estimation.base_columns import BaseParameters, base_parameters
 from armgap.literals import FILTERS, SCHEMES, SERIAL, Filters, Scheme
@@ -120,7 +120,7 @@ class Estimator:
         between: float = 1e6,
         floor: float = 0.0,
     ) -> None:
-        kind = arm if isinstance(arm, str) else arm.kind
+        kind = arm if isinstance(arm, str) else checked_arm(arm).kind
         for name, value, known in (
             ("arm", kind, (*kinds(), *([] if isinstance(arm, str) else [SERIAL]))),
             ("scheme", scheme, SCHEMES),

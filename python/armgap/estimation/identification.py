@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armgap import _native
-from armgap.arm.arm import Arm
+from armgap.arm.arm import Arm, checked_arm
 from armgap.errors import ColumnError, OptionError
 from armgap.estimation.base_columns import BaseParameters
 from armgap.estimation.estimator import Estimator
@@ -217,6 +217,7 @@ def identify(
     ----------
     F. Reyes and R. Kelly, Robotica 15 (1997) 563-571, equations (20)-(30).
     """
+    checked_arm(arm)
     velocity = velocity or ("backward" if filters == "paper" else "central")
     _check(scheme, filters, cutoff, forgetting, p0, velocity)
     fixed = tuple(fixed)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Container
 from dataclasses import dataclass
 from typing import Any
 
@@ -82,11 +83,17 @@ class Corrected(ABC):
         """Return the field of a format that a cause is written to; None if the format has none."""
         return None if cause.row else field_of(cause.effect, cause.joint, form, self.arm.kind)
 
-    def missing(self, form: str) -> tuple[str, ...]:
-        """Return one line for each cause for which a format has no field, or a field that expresses it in part only."""
+    def short(self, cause: Cause, form: str) -> str:
+        """Return what the field of a format does not express of a cause, or the reason why the format has none; empty for nothing to be said."""
+        return FIELDS[cause.effect].short if cause.effect in FIELDS else ""
+
+    def missing(self, form: str, written: Container[str] = ()) -> tuple[str, ...]:
+        """Return one line for each cause for which a format has no field, or a field that expresses it in part only, but for effects `written`."""
         lines = []
         for cause in self.causes:
-            short = FIELDS[cause.effect].short if cause.effect in FIELDS else ""
+            if cause.effect in written:
+                continue
+            short = self.short(cause, form)
             where = self.field_of(cause, form)
             if where is None:
                 lines.append(f"no field for {_named(cause)}: {short or _equation(cause)}")
@@ -124,7 +131,7 @@ def placed(found: Cause | Equivalent) -> str:
 
 
 def _named(cause: Cause) -> str:
-    sizes = ", ".join(f"{name} {v.value:.6g} {v.unit}" for name, v in cause.parameters.items())
+    sizes = ", ".join(f"{name} {v.value:.6g} {v.unit}".removesuffix(" 1") for name, v in cause.parameters.items())
     return f"{placed(cause)} ({sizes})"
 
 

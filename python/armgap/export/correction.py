@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from armgap.arm.arm import Arm
+from armgap.arm.arm import Arm, checked_arm
 from armgap.diagnosis.result import Diagnosis
 from armgap.export.chain.planar import correct_planar
 from armgap.export.chain.serial import correct_serial
@@ -15,6 +15,8 @@ __all__ = ["STAGES", "correct"]
 STAGES = ("with_causes", "refit")
 #: Relative difference up to which parameters of arm file and diagnosis count as equal.
 _EQUAL_PARAMETER_TOLERANCE = 1e-9
+#: First words of the diagnosis' remark on gains of a position controller that were estimated.
+_ESTIMATED_GAINS = "gains of the controller, estimated"
 
 
 def correct(diagnosis: Diagnosis, arm: Arm, *, stage: str = "with_causes", keep_lengths: bool = False) -> Corrected:
@@ -42,7 +44,7 @@ def correct(diagnosis: Diagnosis, arm: Arm, *, stage: str = "with_causes", keep_
     ExportError
         If the diagnosis belongs to another arm, or there is no length to keep.
     """
-    _check(diagnosis, arm, stage)
+    _check(diagnosis, checked_arm(arm), stage)
     values = [diagnosis.parameters[stage][name] for name in arm.parameter_names]
     found = diagnosis.causes if stage == "with_causes" else ()
     causes = tuple(single for cause in found for single in cause.by_joint())
@@ -53,6 +55,11 @@ def correct(diagnosis: Diagnosis, arm: Arm, *, stage: str = "with_causes", keep_
         notes += (
             "the unit of the torques was taken from the arm file's masses: torques and friction are as far off as these",
         )
+    notes += tuple(
+        f"{note}; those stated are kept"
+        for note in diagnosis.extra.get("notes", ())
+        if note.startswith(_ESTIMATED_GAINS)
+    )
     if keep_lengths:
         raise ExportError("lengths of serial arms are always kept", remedy="leave out --keep-lengths", file=arm.path)
     return correct_serial(arm, stage, values, causes, notes, diagnosis)

@@ -67,6 +67,8 @@ _OF_SERIAL = FIELDS | {
     "nominal_link": Field("inertial", "inertial", "link"),
     "rotor_inertia": Field(mjcf="joint armature", toml="drive.rotor_inertia"),
     "base_tilt": Field("option gravity", "joint origin rpy", "gravity"),
+    "controller_gain": Field(toml="controller.kp"),
+    "controller_damping": Field(toml="controller.kd"),
 }
 _SAME_AS_LINK = "inertial of link 1, whose inertia it adds to without a difference"
 

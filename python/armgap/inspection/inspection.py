@@ -7,7 +7,7 @@ import math
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from armgap.arm.arm import Arm
+from armgap.arm.arm import Arm, checked_arm
 from armgap.check.check import Check
 from armgap.check.log_checks.data import data_checks
 from armgap.check.stage import examine
@@ -120,7 +120,7 @@ def inspect(log: Any, arm: Arm | None = None, *, repair: bool = True) -> Inspect
     >>> round(found.sampling.rate_hz), found.joints[0].flat_tops[0].level
     (1000, 8.0)
     """
-    logs = gather(log, arm)
+    logs = gather(log, arm if arm is None else checked_arm(arm))
     if len(logs) != 1:
         raise OptionError(f"{len(logs)} logs were given", remedy="inspect one at a time")
     [log] = logs

@@ -19,6 +19,7 @@ from armgap.log.conversion import clocks, columns, units
 from armgap.log.findings import Finding
 from armgap.log.formats.all import record
 from armgap.log.recording import Recording
+from armgap.options import not_an_arm
 
 if TYPE_CHECKING:
     from armgap.arm.arm import Arm
@@ -215,6 +216,8 @@ class Log:
         arm: Arm | None,
         declared: Mapping[str, str] | None,
     ) -> Log:
+        if not (arm is None or hasattr(arm, "n_joints")):
+            raise not_an_arm(arm)
         place = source if source is not None else name
         names, said = columns.resolve(recording, place, mapping or {}, arm)
         scales = units.stated(names, declared or {}, arm, place)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armgap import options
-from armgap.arm.arm import Arm, only_planar
+from armgap.arm.arm import Arm, arm_of, only_planar
 from armgap.diagnosis.result import Diagnosis
 from armgap.errors import OptionError, ResultError
 from armgap.files.output import STANDARD_STREAM, write
@@ -260,9 +260,9 @@ def plan(
     if not SHORTEST <= seconds <= LONGEST:
         raise OptionError(f"the duration is {seconds:g} s", remedy=f"give {SHORTEST:g} to {LONGEST:g} s")
     number = options.seed(seed)
-    check_optimiser()
-    arm = arm if isinstance(arm, Arm) else Arm.read(Path(arm))
+    arm = arm_of(arm)
     only_planar(arm, "plan")
+    check_optimiser()
     data = _usable(diagnosis, arm)
     with use_callback(progress):
         return _plan(data, arm, questions, seconds, number)

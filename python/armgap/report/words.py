@@ -67,10 +67,9 @@ _NO_CAUSE = {
     ),
     "input": ("None is named", "While the input contradicts itself, any effect would only imitate the contradiction."),
 }
-_NO_CAUSE_OF_SERIAL = (
-    "None that was tested",
-    "Every effect that is tested on serial arms was tried and none explains the gap; elasticity, backlash and pushes are not among them.",
-)
+_NONE_TESTED = "None that was tested"
+#: First words of the reason of effects that a diagnosis of a serial arm does not test.
+_NOT_TESTED = "not tested on serial arms"
 _NONE_ALLOWED = (
     "None was allowed",
     "The number of causes was limited to 0, so no effect was tried as one; allow at least one (--max-causes 1).",
@@ -408,13 +407,21 @@ def variable_text(variable: str) -> str:
     return _VARIABLES.get(bare, variable)
 
 
+def _untested(data: Data) -> str:
+    """Return a sentence on a serial arm without a named cause, with the effects that its logs are not tested for."""
+    ruled_out = data.get("ruled_out") or []
+    names = dict.fromkeys(r["effect"] for r in ruled_out if (r.get("why") or "").startswith(_NOT_TESTED))
+    tried = "Every effect that is tested on serial arms was tried and none explains the gap"
+    return f"{tried}; not tested: {', '.join(map(title, names))}." if names else f"{tried}."
+
+
 def _which(data: Data) -> tuple[str, str]:
     causes = data.get("causes") or []
     if not causes and none_allowed(data):
         return _NONE_ALLOWED
     if not causes:
         if data["verdict"] == "unexplained" and (data.get("arm") or {}).get("kind") == SERIAL:
-            return _NO_CAUSE_OF_SERIAL
+            return _NONE_TESTED, _untested(data)
         return _NO_CAUSE.get(data["verdict"], ("No cause was named", ""))
     headline = _capital(" and ".join(_counted([f"{title(c['effect'])}, {place_text(c)}" for c in causes])))
     text = " ".join(_about(cause, alone=len(causes) == 1) for cause in causes)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from armgap.arm.description.mjcf_actuators import Actuators
 from armgap.arm.description.tree import MOVING, Joint, Mimic, Tree
 from armgap.arm.rigid_body import about_origin, moved, unit_axis
 from armgap.errors import ModelFileError, OptionError
@@ -50,6 +51,7 @@ class _Mjcf:
         self.mujoco = mujoco
         self.model = model
         self.path = path
+        self.actuators = Actuators(mujoco, model)
 
     def tree(self) -> Tree:
         m = self.model
@@ -79,10 +81,16 @@ class _Mjcf:
                 joints[fixed] = Joint(fixed, before, name, "fixed", rotation, origin)
             offset[body] = anchor
             links[name] = self._inertial(body, anchor)
-        self._actuated(joints)
+        for j in range(m.njnt):
+            name = self._joint_name(j)
+            if joints[name].kind in MOVING:
+                joints[name] = self.actuators.on(j, joints[name])
         self._coupled(joints)
         name = str(m.names[: m.names.index(b"\0")], "utf-8", "replace") if isinstance(m.names, bytes) else ""
-        return Tree(self.path, "MJCF", name, links, joints, np.array(m.opt.gravity), tuple(self._notes()))
+        weightless = m.opt.disableflags & self.mujoco.mjtDisableBit.mjDSBL_GRAVITY
+        gravity = np.zeros(3) if weightless else np.array(m.opt.gravity)
+        carried = {self._body(body): float(m.body_gravcomp[body]) for body in range(m.nbody)}
+        return Tree(self.path, "MJCF", name, links, joints, gravity, tuple(self._notes()), carried)
 
     def _body(self, body: int) -> str:
         return self.model.body(body).name or f"body{body}"
@@ -112,7 +120,7 @@ class _Mjcf:
                 rotation = rotation @ _matrix(np.array([math.cos(half), *(math.sin(half) * axis)]))
         limited = bool(m.jnt_limited[j])
         lower, upper = (float(x) for x in m.jnt_range[j]) if limited else (-math.inf, math.inf)
-        effort = float(m.jnt_actfrcrange[j][1]) if m.jnt_actfrclimited[j] else math.inf
+        effort = float(np.max(np.abs(m.jnt_actfrcrange[j]))) if m.jnt_actfrclimited[j] else math.inf
         return replace(
             joint,
             rotation=rotation,
@@ -124,28 +132,22 @@ class _Mjcf:
             viscous=float(m.dof_damping[dof]),
             coulomb=float(m.dof_frictionloss[dof]),
             rotor_inertia=float(m.dof_armature[dof]) or math.nan,
+            remarks=self._remarks(j, dof),
         )
 
-    def _actuated(self, joints: dict[str, Joint]) -> None:
-        """Give joints the limits and gains of their MJCF actuators."""
-        m, enum = self.model, self.mujoco
-        for a in range(m.nu):
-            if m.actuator_trntype[a] != enum.mjtTrn.mjTRN_JOINT:
-                continue
-            name = self._joint_name(int(m.actuator_trnid[a][0]))
-            joint, gear = joints[name], float(m.actuator_gear[a][0])
-            gain, bias = m.actuator_gainprm[a], m.actuator_biasprm[a]
-            fixed = m.actuator_gaintype[a] == enum.mjtGain.mjGAIN_FIXED
-            limits = [joint.effort]
-            if m.actuator_forcelimited[a]:
-                limits.append(abs(gear) * float(np.max(np.abs(m.actuator_forcerange[a]))))
-            if fixed and m.actuator_biastype[a] == enum.mjtBias.mjBIAS_NONE and m.actuator_ctrllimited[a]:
-                limits.append(abs(gear * gain[0]) * float(np.max(np.abs(m.actuator_ctrlrange[a]))))
-            joint = replace(joint, effort=min(limits))
-            affine = m.actuator_biastype[a] == enum.mjtBias.mjBIAS_AFFINE
-            if fixed and affine and gain[0] > 0 and math.isclose(-bias[1], gain[0]):
-                joint = replace(joint, kp=float(gain[0]) * gear**2, kd=max(-float(bias[2]), 0.0) * gear**2)
-            joints[name] = joint
+    def _remarks(self, j: int, dof: int) -> dict[str, str]:
+        """Return remarks on what a joint has besides its axis, limits and friction."""
+        m, remarks = self.model, {}
+        if m.jnt_stiffness[j] or np.any(m.jnt_stiffnesspoly[j]):
+            rates = ", ".join(f"{k:g}" for k in (m.jnt_stiffness[j], *np.trim_zeros(m.jnt_stiffnesspoly[j], "b")))
+            remarks["springs are left out"] = f"stiffness {rates} about {float(m.qpos_spring[m.jnt_qposadr[j]]):.4g}"
+        if np.any(m.dof_dampingpoly[dof]):
+            further = ", ".join(f"{c:g}" for c in m.dof_dampingpoly[dof])
+            remarks["damping that is not proportional to the speed is left out"] = f"coefficients {further}"
+        low, high = m.jnt_actfrcrange[j]
+        if m.jnt_actfrclimited[j] and not math.isclose(-low, high):
+            remarks["torque limits that differ by direction are taken as the larger"] = f"{low:g} to {high:g}"
+        return remarks
 
     def _coupled(self, joints: dict[str, Joint]) -> None:
         """Add a `Mimic` to each joint that an MJCF equality constraint couples to another joint."""
@@ -166,16 +168,30 @@ class _Mjcf:
             joints[name] = replace(joints[name], mimic=mimic)
 
     def _notes(self) -> list[str]:
-        m, notes = self.model, []
-        sprung = [self._joint_name(j) for j in range(m.njnt) if m.jnt_stiffness[j] != 0]
-        if sprung:
-            notes.append(f"springs are left out: {', '.join(f'`{name}`' for name in sprung[:12])}")
-        closing = (self.mujoco.mjtEq.mjEQ_CONNECT, self.mujoco.mjtEq.mjEQ_WELD)
-        if any(kind in closing for kind in m.eq_type):
+        """Return remarks on what acts on no single joint."""
+        m, kinds, notes = self.model, self.mujoco.mjtEq, []
+        active = [int(e) for e in np.flatnonzero(m.eq_active0)]
+        closing, known = [int(kinds.mjEQ_CONNECT), int(kinds.mjEQ_WELD)], int(kinds.mjEQ_JOINT)
+        if any(m.eq_type[e] in closing for e in active):
             notes.append("connections that close a chain are left out")
+        bent = [self._joint_name(int(m.eq_obj1id[e])) for e in active if self._is_bent(e)]
+        if bent:
+            notes.append(f"couplings of joints are taken as linear: {', '.join(f'`{name}`' for name in bent[:12])}")
+        if any(m.eq_type[e] not in (*closing, known) for e in active):
+            notes.append("equality constraints of tendons and flexible bodies are left out")
         if m.ntendon:
             notes.append("tendons are left out")
+        if self.actuators.elsewhere:
+            names = ", ".join(f"`{name}`" for name in self.actuators.elsewhere[:12])
+            notes.append(f"actuators that drive no single joint are left out: {names}")
+        if m.opt.density or m.opt.viscosity:
+            notes.append("forces of the medium (density, viscosity) are left out")
         return notes
+
+    def _is_bent(self, e: int) -> bool:
+        """Return whether an equality constraint couples two joints by more than a linear law."""
+        coupled = self.model.eq_type[e] == self.mujoco.mjtEq.mjEQ_JOINT and self.model.eq_obj2id[e] >= 0
+        return bool(coupled and np.any(self.model.eq_data[e][2:5]))
 
 
 def _matrix(quaternion: Array) -> Array:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armgap.arm.arm_file import suggest
-from armgap.arm.controller import Controller
+from armgap.arm.description.control import controlled, joint_remarks
 from armgap.arm.description.resolved import ResolvedModel
 from armgap.arm.description.tree import MOVING, Joint, Tree
 from armgap.arm.rigid_body import about_axis, inconsistency, moved
@@ -139,6 +139,8 @@ class _Resolver:
         self.frozen = frozen
         self.still: dict[str, float] = {}
         """Positions [rad or m] of moving joints outside the chain for which no position was given, by name of the joint."""
+        self.moved: list[str] = []
+        """Names of the links that the chain's joints move."""
         for name in frozen:
             if name not in tree.joints:
                 raise tree.error(None, f"has no joint `{name}` to freeze", suggest(name, self._movable()))
@@ -166,6 +168,8 @@ class _Resolver:
         if not moving:
             raise tree.error(None, f"no joint moves between `{base}` and `{tip}`", "choose another base or tip")
         placements, inertial = self._fused(path, base)
+        remarks = joint_remarks(moving)
+        controller, torque_limit, gravity = controlled(tree, moving, self.moved, self._gravity(to_base), remarks)
         chain = SerialChain(
             joint_names=tuple(joint.name for joint in moving),
             link_names=tuple(joint.child for joint in moving),
@@ -173,14 +177,14 @@ class _Resolver:
             rotation=np.array([pose.rotation for pose in placements]),
             translation=np.array([pose.translation for pose in placements]),
             axis=np.array([joint.axis for joint in moving]),
-            gravity=self._gravity(to_base),
+            gravity=gravity,
             lower=_values(moving, "lower"),
             upper=_values(moving, "upper"),
             speed=_values(moving, "speed"),
             acceleration=np.full(len(moving), math.inf),
             effort=_values(moving, "effort"),
         )
-        notes = [*tree.notes, *self._said(chain, inertial)]
+        notes = [*tree.notes, *self._said(chain, inertial), *remarks]
         viscous, coulomb = (self._friction(moving, name, notes) for name in ("viscous", "coulomb"))
         return ResolvedModel(
             name=tree.name,
@@ -190,7 +194,8 @@ class _Resolver:
             viscous=viscous,
             coulomb=coulomb,
             gear_ratio=_gear_ratio(moving, notes),
-            controller=_controller(moving, notes),
+            controller=controller,
+            torque_limit=torque_limit,
             notes=tuple(notes),
         )
 
@@ -307,6 +312,7 @@ class _Resolver:
     def _hanging(self, link: str, pose: _Pose, onward: Joint | None) -> Array:
         """Return the ten inertial parameters of a link with all links that hang on it, except those behind the chain's joint `onward`."""
         bodies = self._carried(link, pose, onward)
+        self.moved += [body.link for body in bodies]
         return sum((moved(self.tree.links[b.link], b.rotation, b.translation) for b in bodies), np.zeros(10))
 
     def _carried(self, link: str, pose: _Pose, onward: Joint | None, *, rigid: bool = True) -> list[Carried]:
@@ -479,12 +485,3 @@ def _gear_ratio(moving: list[Joint], notes: list[str]) -> Array | None:
         notes.append(f"gear ratios are left out: there is none for {missing}")
         return None
     return ratios
-
-
-def _controller(moving: list[Joint], notes: list[str]) -> Controller | None:
-    """Return the position controller with the gains of the joints' actuators; None unless all joints have a position actuator."""
-    kp, kd = _values(moving, "kp"), _values(moving, "kd")
-    if not np.isfinite(kp).all():
-        return None
-    notes.append("position actuators are taken as a PD controller")
-    return Controller(kp=kp, kd=np.nan_to_num(kd, nan=0.0))

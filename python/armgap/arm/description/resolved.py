@@ -33,6 +33,8 @@ class ResolvedModel:
         Standard deviations of `inertial`; nan for links without stated trust.
     controller : Controller, optional
         Position actuators of the description.
+    torque_limit : ndarray, shape (n_joints,), optional
+        Largest torques of the position actuators [N m or N].
     notes : tuple of str
         Remarks on how elements of the description were read, and on suspicious values.
     """
@@ -46,4 +48,5 @@ class ResolvedModel:
     gear_ratio: NDArray[np.float64] | None = None
     sigma: NDArray[np.float64] | None = None
     controller: Controller | None = None
+    torque_limit: NDArray[np.float64] | None = None
     notes: tuple[str, ...] = ()

@@ -57,6 +57,9 @@ class Joint:
         Coupling to the joint that this joint follows.
     row : int, optional
         Line of the joint in the description's file.
+    remarks : mapping of str to str
+        What the description says of the joint that the chain has no place for, or that was taken in a certain way: words for all joints
+        alike, and details of this joint, which may be empty.
     """
 
     name: str
@@ -78,6 +81,7 @@ class Joint:
     kd: float = math.nan
     mimic: Mimic | None = None
     row: int | None = None
+    remarks: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -100,6 +104,8 @@ class Tree:
         Acceleration of gravity in the frame of the root link [m/s^2].
     notes : tuple of str
         Remarks from reading the description.
+    compensated : mapping of str to float
+        Share of each link's weight that the description's simulator carries; 0 for links that are not in it.
 
     Raises
     ------
@@ -114,6 +120,7 @@ class Tree:
     joints: Mapping[str, Joint]
     gravity: Array
     notes: tuple[str, ...] = ()
+    compensated: Mapping[str, float] = field(default_factory=dict)
     parent_joint: dict[str, Joint] = field(init=False, default_factory=dict)
     """Joint that moves each link, by name of the link; root links have no entry."""
     child_joints: dict[str, list[Joint]] = field(init=False, default_factory=dict)

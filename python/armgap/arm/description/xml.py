@@ -80,7 +80,8 @@ def parse(data: bytes, path: Path) -> Element:
         stack[-1].text += data
 
     def entity(*_: object) -> None:
-        raise ModelFileError("defines an entity", remedy="write it out", file=path, row=parser.CurrentLineNumber)
+        remedy = "write entities out, for example with xmllint --noent --dropdtd"
+        raise ModelFileError("declares an entity", remedy=remedy, file=path, row=parser.CurrentLineNumber)
 
     parser.StartElementHandler, parser.EndElementHandler = start, end
     parser.CharacterDataHandler, parser.EntityDeclHandler = text, entity
@@ -90,6 +91,8 @@ def parse(data: bytes, path: Path) -> Element:
     except expat.ExpatError as error:
         problem = f"is not valid XML: {expat.ErrorString(error.code)}"
         raise ModelFileError(problem, remedy="correct that line", file=path, row=error.lineno) from None
+    except ModelFileError:
+        raise
     except (LookupError, ValueError) as error:  # an unknown encoding
         raise ModelFileError(f"cannot be read as text ({error})", remedy="store it as UTF-8", file=path) from None
     return top.children[0]

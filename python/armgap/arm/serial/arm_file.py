@@ -94,6 +94,7 @@ class SerialArmFile(ArmFile):
         viscous = self._nominal("friction.viscous", model.viscous, scale.viscous, FRICTION_SHARE)
         coulomb = self._nominal("friction.coulomb", model.coulomb, scale.coulomb, FRICTION_SHARE)
         gear_ratio = self._either("drive.gear_ratio", "transmission.gear_ratio", n)
+        torque_limit = self._either("drive.torque_limit", "actuator.torque_limit", n)
         if not (np.isfinite(inertial).all() and np.isfinite(sigma).all() and np.isfinite(chain.translation).all()):
             key = next((source for source in _SOURCES if source in self.data), "urdf")
             raise self.error(key, "gives links too heavy or too long to compute with", "give kg and m")
@@ -105,7 +106,7 @@ class SerialArmFile(ArmFile):
             theta=np.concatenate([inertial.ravel(), rotor[0], viscous[0], coulomb[0]]),
             sigma=np.concatenate([sigma.ravel(), rotor[1], viscous[1], coulomb[1]]),
             counts_per_rev=self._optional("encoder.counts_per_rev", n),
-            torque_limit=self._either("drive.torque_limit", "actuator.torque_limit", n),
+            torque_limit=model.torque_limit if torque_limit is None else torque_limit,
             encoder_side=self._sides("encoder.side", n),
             friction_side=self._sides("transmission.friction_side", n),
             gear_ratio=model.gear_ratio if gear_ratio is None else gear_ratio,

@@ -137,7 +137,8 @@ class SerialChain:
             return _native.Chain(list(self.kinds), self.rotation, self.translation, self.axis, self.gravity)
         except ValueError as error:
             raise OptionError(
-                str(error), remedy="freeze the joints that do not move, see [frozen] of the arm file"
+                str(error),
+                remedy="freeze joints that stand still: armgap model ROBOT.urdf --freeze JOINT=POSITION -o ARM.toml",
             ) from None
 
     def to_native(self) -> dict[str, Any]:

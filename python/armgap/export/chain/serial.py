@@ -11,10 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armgap.arm.arm import Arm
+from armgap.arm.controller import Controller
 from armgap.arm.rigid_body import INERTIAL_NAMES, about_axis, about_com, about_origin
 from armgap.arm.serial.chain import SerialChain
 from armgap.diagnosis.result import Cause, Diagnosis, Value
 from armgap.export.chain.bodies import Bodies, nearest_bodies
+from armgap.export.chain.controller import OF_CONTROLLER, controller_with_causes
 from armgap.export.chain.joint import Joint, with_causes
 from armgap.export.chain.model import SimulatorModel
 from armgap.export.chain.motion import any_states, diagnosed_states, positions
@@ -27,6 +29,8 @@ Array = NDArray[np.float64]
 
 #: Names of the parameters of a payload that state the position of its mass.
 _COM = ("com_x", "com_y", "com_z")
+#: Formats without a position controller, and what takes its place.
+_NO_CONTROLLER = {"mjcf": "its actuators are motors", "urdf": "URDF holds no controller"}
 
 
 @dataclass(frozen=True)
@@ -47,6 +51,8 @@ class CorrectedSerial(Corrected):
         Torques per unit of each inertial parameter, along the diagnosed motion and in random states.
     bodies : Bodies
         Physically consistent links with the torques of the estimated links, see `nearest_bodies`.
+    controller : Controller, optional
+        The arm file's position controller with the gains that causes change.
     """
 
     chain: SerialChain
@@ -55,6 +61,7 @@ class CorrectedSerial(Corrected):
     expected: Array
     regressor: Array
     bodies: Bodies
+    controller: Controller | None = None
 
     def beside(self, hanging: Array) -> CorrectedSerial:
         """Return the model with links that stay physically consistent without the parts `hanging`, ten inertial parameters per link."""
@@ -86,6 +93,7 @@ class CorrectedSerial(Corrected):
             theta=theta,
             sigma=sigma,
             chain=self.chain,
+            controller=self.controller,
             sealed=None,
             notes=(),
         )
@@ -100,13 +108,27 @@ class CorrectedSerial(Corrected):
         original : bool, default False
             Whether the values are written into the user's own description.
         """
-        lines = [*self.missing(form), *self.notes]
+        own_servos = original and form == "mjcf"
+        lines = [*self.missing(form, OF_CONTROLLER if own_servos else ()), *self.notes]
         if form == "toml":
             return tuple(lines)
+        if self.controller is not None and form in _NO_CONTROLLER and not own_servos:
+            lines.append(f"the position controller of the arm file is not in the file: {_NO_CONTROLLER[form]}")
         if self.exceeded:
             what = "they are left as they were" if original else "they are left out"
             lines.append(f"the arm moves beyond the limits of position of {', '.join(self.exceeded)}: {what}")
         return (*lines, *_said(self.bodies, self.chain))
+
+    def short(self, cause: Cause, form: str) -> str:
+        """Return what the field of a format does not express of a cause, or the reason why the format has none; empty for nothing to be said."""
+        if cause.effect not in OF_CONTROLLER:
+            return super().short(cause, form)
+        if cause.effect == "reference_delay":
+            return "delay the reference, but not the feedback, in your own controller"
+        if form in ("toml", "json") or self.controller is None or cause.joint is None:
+            return ""
+        name = "kp" if cause.effect == "controller_gain" else "kd"
+        return f"set {name} = {getattr(self.controller, name)[cause.joint - 1]:.6g} in your own controller"
 
     def data(self) -> dict[str, Any]:
         """Return entries of the exported JSON object that only serial arms have: physically consistent links, and gravity."""
@@ -115,7 +137,10 @@ class CorrectedSerial(Corrected):
             mass, com, inertia = about_com(ten)
             links.append({"name": name, "mass": mass, "com": com.tolist(), "inertia": inertia.tolist()})
         changed = [self.chain.link_names[k] for k in self.bodies.changed]
+        servo = self.controller
+        gains = {} if servo is None else {name: values.tolist() for name, values in servo.vectors}
         return {
+            **({} if servo is None else {"controller": {"kind": servo.kind, "kd_on": servo.kd_on, **gains}}),
             "links": links,
             "gravity": self.chain.gravity.tolist(),
             "projected": {"links": changed, "torque_error": self.bodies.torque_error.tolist()},
@@ -164,6 +189,7 @@ def correct_serial(
             sigma[row] = math.hypot(sigma[row], cause.parameters["inertia"].sigma)
         elif cause.effect == "base_tilt":
             tilt = tilt @ _turned(cause)
+    controller, said = controller_with_causes(arm, causes)
     viscous, coulomb = theta[11 * n :].reshape(2, n)
     limits = arm.torque_limit if arm.torque_limit is not None else chain.effort
     random = any_states(arm)
@@ -190,7 +216,7 @@ def correct_serial(
         sigma,
         with_causes(joints, causes),
         causes,
-        notes,
+        (*notes, *said),
         diagnosis.verdict,
         replace(chain, gravity=tilt.T @ chain.gravity),
         tilt,
@@ -198,6 +224,7 @@ def correct_serial(
         expected,
         regressor,
         bodies,
+        controller,
     )
 
 

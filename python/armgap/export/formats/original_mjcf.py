@@ -19,6 +19,7 @@ from armgap.export.chain.serial import CorrectedSerial
 from armgap.export.errors import ExportError
 from armgap.export.formats import header
 from armgap.export.formats.mjcf import FAR, SHARP
+from armgap.export.formats.servos import driving, write_servo
 
 __all__ = ["write_mjcf"]
 
@@ -114,7 +115,11 @@ class _Writer:
     def joint(self, name: str, found: Joint, j: int) -> None:
         joint = next(x for x in self.spec.joints if (x.name or f"joint{x.id}") == name)
         angle = self.angle if self.model.chain.kinds[j] == "revolute" else 1.0
-        joint.damping[:] = [found.viscous, found.drag, found.cubic_drag]
+        if np.any(joint.damping[1:]):
+            self.remarks.append(
+                f"joint `{name}` keeps its further coefficients of damping, which the diagnosis did not have"
+            )
+        joint.damping[:] = [found.viscous, found.drag + joint.damping[1], found.cubic_drag + joint.damping[2]]
         joint.frictionloss, joint.armature = found.coulomb, found.armature
         if found.coulomb:
             joint.solref_friction[:] = [2 * self.spec.option.timestep, 1]
@@ -134,6 +139,12 @@ class _Writer:
             tendon = self.spec.add_tendon(name=f"stop{j + 1}", springlength=[low, high])
             tendon.stiffness[:] = [stiffness, 0, 0]
             tendon.wrap_joint(joint.name, 1.0)
+        for actuator in driving(self.mujoco, self.spec, name):
+            # Armature and damping of the actuator are the joint's now, and its gains no longer follow from the corrected inertia.
+            actuator.armature, actuator.damping[:] = 0.0, 0.0
+            if actuator.biasprm[1] < 0 < actuator.biasprm[2]:
+                actuator.biasprm[2] = self.compiled.actuator_biasprm[actuator.id][2]
+        self.remarks += write_servo(self.mujoco, self.spec, self.model, name, j)
         self._drive(name, found, j)
 
     def _drive(self, name: str, found: Joint, j: int) -> None:
@@ -142,12 +153,12 @@ class _Writer:
         if not (limited or found.offset or found.lag or found.delay or found.gain != 1.0):
             return
         enum = self.mujoco
-        driving = [a for a in self.spec.actuators if a.trntype == enum.mjtTrn.mjTRN_JOINT and a.target == name]
-        if len(driving) != 1:
-            many = "no actuator" if not driving else "several actuators"
+        actuators = driving(self.mujoco, self.spec, name)
+        if len(actuators) != 1:
+            many = "no actuator" if not actuators else "several actuators"
             self.remarks.append(f"{many} of joint `{name}`: what was found of its drive is not in the file")
             return
-        actuator, step = driving[0], self.spec.option.timestep
+        actuator, step = actuators[0], self.spec.option.timestep
         gear = float(actuator.gear[0])
         if actuator.gaintype != enum.mjtGain.mjGAIN_FIXED or actuator.biastype not in (
             enum.mjtBias.mjBIAS_NONE,

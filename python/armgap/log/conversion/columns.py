@@ -13,7 +13,8 @@ import polars as pl
 from numpy.typing import NDArray
 
 from armgap.errors import ColumnError, LogShapeError, SampleError, UnitError
-from armgap.log.conversion.index import QUANTITIES, Index
+from armgap.log.conversion.index import Index
+from armgap.log.conversion.joint_names import named_after_joints
 from armgap.log.findings import Finding
 from armgap.log.recording import Recording
 from armgap.progress import report_progress
@@ -136,12 +137,13 @@ def resolve(
 
     A name given in `mapping` must exist. The arm file's names come next; a log with standard names instead,
     such as one written by armgap, is read by these. For a serial arm columns called ``joint/position``, ``/velocity`` and ``/effort`` are found by
-    the names of the chain's joints. Remaining columns are taken as the file itself suggests.
+    the names of the chain's joints, see `named_after_joints`. Remaining columns are taken as the file itself suggests.
     """
     index = Index(recording, place)
-    names = {**_from_joints(index, arm), **_from_arm(index, arm), **mapping}
+    given = {**_from_arm(index, arm), **mapping}
+    by_joint, findings = named_after_joints(index, arm, given)
+    names = {**by_joint, **given}
     n = arm.n_joints if arm is not None else None
-    findings: list[Finding] = []
     if recording.suggest is not None:
         suggestion = recording.suggest(n, names)
         findings += suggestion.findings
@@ -320,19 +322,6 @@ def _from_arm(index: Index, arm: Arm | None) -> dict[str, str]:
         for key, name in arm.columns.items()
         if _CANONICAL.match(key) and (key not in columns or name in columns or index.find(name, key) is not None)
     }
-
-
-def _from_joints(index: Index, arm: Arm | None) -> dict[str, str]:
-    """Return columns named after the joints of a chain, by standard name; all joints if one has a column, so that errors name missing columns."""
-    if arm is None or arm.chain is None:
-        return {}
-    names: dict[str, str] = {}
-    for key, quantity in QUANTITIES.items():
-        mapped = {f"{key}{j}": f"{joint}/{quantity}" for j, joint in enumerate(arm.chain.joint_names, start=1)}
-        there = any(index.find(name, column) is not None for column, name in mapped.items())
-        if there and not any(column in index.recording.columns for column in mapped):
-            names |= mapped
-    return names
 
 
 def _check_mapping(names: Mapping[str, str], place: Path | str, n: int) -> None:
