@@ -13,7 +13,7 @@ from armgap.check.drive_limit import deliver, delivered
 from armgap.check.equation_error import EquationError, Rows, bounds
 from armgap.log.log import SIGNALS, Log
 
-__all__ = ["MISFIT_RATIO", "SHARE", "Run", "constant_torques", "dead", "find", "merged", "without_constant"]
+__all__ = ["DEAD_SHARE", "MISFIT_RATIO", "Run", "constant_torques", "dead_check", "find", "merged", "without_constant"]
 
 Run = tuple[int, int, int]
 """Joint (from 0), and the first and last sample of a stretch in which the joint's torque does not change."""
@@ -23,7 +23,7 @@ _SHORTEST_S = 0.4
 _FORGOTTEN_S = 0.2
 # Ratio of the mean square residual of the equation of motion in a dead stretch to that elsewhere, and residual as a share of the joint's torque.
 MISFIT_RATIO = 25.0
-SHARE = 0.1
+DEAD_SHARE = 0.1
 # Largest time [s] between the beginnings of stretches of constant torque that are judged together, by rows outside of all stretches.
 _TOGETHER_S = 16.0
 # Part of a log outside stretches of constant torque from which the limits of the drives, and shifts, are estimated without these stretches.
@@ -114,12 +114,12 @@ def _judged(log: Log, rows: Rows, arm: Arm, runs: list[Run], near: list[Run]) ->
         if inside.sum() < _MIN_STRETCH_ROWS:
             continue
         within, outside = (float(np.mean(residual[part, j] ** 2)) for part in (inside, alive))
-        if within > MISFIT_RATIO * outside and within > SHARE * float(base.scale[j]):
-            checks.append(dead(log, (j, first, last), within, outside))
+        if within > MISFIT_RATIO * outside and within > DEAD_SHARE * float(base.scale[j]):
+            checks.append(dead_check(log, (j, first, last), within, outside))
     return merged(checks)
 
 
-def dead(log: Log, run: Run, within: float, outside: float) -> Check:
+def dead_check(log: Log, run: Run, within: float, outside: float) -> Check:
     """Return the check of a dead stretch, from the mean squares of the missing torque `within` and `outside` the stretch [N^2 m^2 or N^2]."""
     j, first, last = run
     begins, ends = float(log.t[first]), float(log.t[last])

@@ -24,8 +24,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armgap.arm.arm import Arm
-from armgap.check import serial
 from armgap.check.contradiction import Refit
+from armgap.check.serial import weak_form
 from armgap.diagnosis.drive import Drive
 from armgap.literals import ChainStage
 from armgap.log.log import Log
@@ -113,7 +113,7 @@ class _Case:
         if self.arm.chain is None:
             error = Refit.of(self.arm, training, holdout, self.horizon).error
             return np.nan_to_num(error**2, nan=np.inf, posinf=np.inf)
-        found = serial.fit([*training, *holdout], self.arm)
+        found = weak_form.fit([*training, *holdout], self.arm)
         return np.zeros(self.arm.n_joints) if found is None else np.nan_to_num(np.maximum(found.share, 0.0))
 
     def signals(self) -> Iterator[_Signal]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from armgap.arm.arm import Arm
 from armgap.arm.corrections import Corrections
 from armgap.check.check import Check
-from armgap.check.dead_stretch import MISFIT_RATIO, SHARE, Run, constant_torques, dead, merged
+from armgap.check.dead_stretch import DEAD_SHARE, MISFIT_RATIO, Run, constant_torques, dead_check, merged
 from armgap.check.serial.weak_form import MOST_INTERVALS, LogRows, Rows
 from armgap.log.log import Log
 
@@ -126,8 +126,8 @@ def _judged(
         lacks = _beside_friction(rows.psi[inside, j], rows.y[inside, j] - asked.sum(axis=1), j)
         not_recorded = lacks > _NOT_RECORDED * largest and within > MISFIT_RATIO * outside[j]
         return _not_recorded(log, j, within) if not_recorded else None
-    if within > MISFIT_RATIO * outside[j] and within > SHARE * largest:
-        return dead(log, run, within, float(outside[j]))
+    if within > MISFIT_RATIO * outside[j] and within > DEAD_SHARE * largest:
+        return dead_check(log, run, within, float(outside[j]))
     return None
 
 
