@@ -13,6 +13,7 @@ from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
+import polars as pl
 from numpy.typing import NDArray
 
 from armgap import _native
@@ -105,11 +106,7 @@ class Rows:
         width = max(_SPEED_SAMPLES, round(_SPEED_S / period)) | 1
         speed = np.abs(np.gradient(_running_mean(q, width), t, axis=0))
         slow = speed < _STANDSTILL * np.sqrt(np.mean(speed**2, axis=0))
-        forget = math.exp(-cutoff * period)
-        memory, remembered = np.zeros(slow.shape), np.zeros(slow.shape[1])
-        for k, now in enumerate(slow):
-            remembered = forget * remembered + (1.0 - forget) * now
-            memory[k] = remembered
+        memory = _low_passed(slow.astype(float), math.exp(-cutoff * period))
         moving: Mask = memory[self.samples - first] < _REMEMBERED
         return moving
 
@@ -127,6 +124,13 @@ class Rows:
         y = self.y.copy()
         y[:, joint] = filtered[self.samples - part.start, 0]
         return replace(self, y=y)
+
+
+def _low_passed(x: Array, forget: float) -> Array:
+    """Return each column through a first-order low-pass filter with the pole `forget`, from rest."""
+    from_rest = np.vstack([np.zeros(x.shape[1]), x])
+    columns = [pl.Series(column).ewm_mean(alpha=1.0 - forget, adjust=False).to_numpy()[1:] for column in from_rest.T]
+    return np.column_stack(columns)
 
 
 def _running_mean(q: Array, width: int) -> Array:
