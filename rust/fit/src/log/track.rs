@@ -19,9 +19,14 @@ const CONFIDENCE: f64 = 2.0;
 /// too uncertain to show less.
 const LEAST_ERROR: f64 = 0.25;
 
-/// Upper bound of the estimated mean square error of a measured state, in units of its variance: with larger errors the positions are not those of
-/// the arm.
-const LARGEST_ERROR: f64 = 10.0;
+/// Upper bound of the estimated mean square error of a measured position, in units of its variance, because a single sample says no more; and of a
+/// measured velocity in the floor of serial arms.
+pub const LARGEST_ERROR: f64 = 10.0;
+
+/// Mean square error of a measured velocity, in units of its variance, per unit of one plus the cubic's mean square residual in units of the noise.
+/// Of 255 joints of simulated logs with known velocities it puts the RMS error over the windows within a factor of 0.7 to 1.4 in 0.70; with 0.5 in
+/// 0.67, with 1 in 0.56.
+const ERROR_PER_MISFIT: f64 = 0.7;
 
 /// Number of samples of the widest local cubic.
 const WIDEST: usize = 2 * HALF_WIDTHS[HALF_WIDTHS.len() - 1] + 1;
@@ -79,8 +84,6 @@ pub struct Reference<const N: usize> {
 pub struct Smoothed {
     /// Local cubic that is used for the sample's state.
     pub local: Local,
-    /// Widest local cubic that is consistent with all narrower ones.
-    pub wider: Local,
     /// Half width of the local cubic, in samples.
     pub half_width: usize,
 }
@@ -103,7 +106,7 @@ pub struct InitialState<const N: usize> {
     pub dq: SVector<f64, N>,
     /// Per joint: variance of the position, covariance of position and velocity, variance of the velocity, SI.
     pub covariance: [[f64; 3]; N],
-    /// Per joint: mean square error of position and of velocity, bias of the local cubic included, in units of their variance.
+    /// Per joint: estimated mean square error of position and of velocity, bias of the local cubic included, in units of their variance.
     pub mean_square: [[f64; 2]; N],
 }
 
@@ -283,9 +286,8 @@ impl<const N: usize> Track<N> {
             mean_square: [[1.0; 2]; N],
         };
         for j in 0..N {
-            let smoothed = self.nested(j, at);
-            let local = smoothed.local;
-            start.mean_square[j] = self.mean_square(j, at, &smoothed);
+            let local = self.local(j, at);
+            start.mean_square[j] = self.mean_square(j, at, &local);
             let variance = self.noise[j] * self.noise[j];
             (start.q[j], start.dq[j]) = (local.q, local.dq);
             start.covariance[j] = local.covariance.map(|c| c * variance);
@@ -320,7 +322,7 @@ impl<const N: usize> Track<N> {
         self.nested(j, at).local
     }
 
-    /// Local cubic of joint `j` around sample `at`, together with the widest that passes the test of confidence intervals.
+    /// Local cubic of joint `j` around sample `at`, with its half width.
     fn nested(&self, j: usize, at: usize) -> Smoothed {
         self.widest(j, at, self.driven[j].as_deref())
     }
@@ -342,24 +344,22 @@ impl<const N: usize> Track<N> {
             }
             (before, widest) = (widest, (local, half));
         }
-        Smoothed { local: before.0, wider: widest.0, half_width: before.1 }
+        Smoothed { local: before.0, half_width: before.1 }
     }
 
     /// Mean square errors of a local cubic's position and velocity in units of their variance: raised where the cubic's residuals exceed the noise
-    /// because no cubic describes the motion, and by the distance of the cubic from the sample and from a wider cubic.
+    /// because no cubic describes the motion, and that of the position by the distance of the cubic from the sample.
     ///
     /// Where positions are held over several rows, the residuals of a cubic say nothing about the motion.
-    fn mean_square(&self, j: usize, at: usize, smoothed: &Smoothed) -> [f64; 2] {
+    fn mean_square(&self, j: usize, at: usize, local: &Local) -> [f64; 2] {
         if self.is_held[j] {
             return [1.0; 2];
         }
-        let Smoothed { local, wider, .. } = smoothed;
         let noise = self.noise[j].powi(2);
-        let [vq, _, vdq] = local.covariance;
+        let vq = local.covariance[0];
         let misfit = local.misfit / noise;
         let position = misfit + ((self.q[at][j] - local.q).powi(2) / noise - (1.0 - vq)) / vq;
-        let wide = ((local.dq - wider.dq).powi(2) / noise - (vdq - wider.covariance[2])) / vdq;
-        [position, misfit + wide].map(|error| error.clamp(LEAST_ERROR, LARGEST_ERROR))
+        [position.clamp(LEAST_ERROR, LARGEST_ERROR), ERROR_PER_MISFIT * (1.0 + misfit)]
     }
 }
 
@@ -447,5 +447,40 @@ mod tests {
         assert!(whole.initial_state(whole.len() - 1).dq[0].is_finite());
         let mixed = Track::joined(&[&beside(), &jerky(1.0).0]).unwrap();
         assert!(mixed.driven[0].is_none());
+    }
+
+    /// Ratio of the estimated RMS velocity error, over all samples, to the true one.
+    fn claimed(track: &Track<1>, rates: &[f64]) -> f64 {
+        let (mut claimed, mut true_square) = (0.0, 0.0);
+        for (k, rate) in rates.iter().enumerate().take(790).skip(10) {
+            let state = track.initial_state(k);
+            claimed += state.mean_square[0][1] * state.covariance[0][2];
+            true_square += (state.dq[0] - rate).powi(2);
+        }
+        (claimed / true_square).sqrt()
+    }
+
+    #[test]
+    fn the_error_of_a_measured_velocity_is_known_in_smooth_motion_and_beside_jumps_of_the_torque() {
+        // A torque that jumps every eighth of a second, of a size from hardly visible to far above the noise, behind an encoder.
+        for size in [0.0, 0.02, 0.5, 10.0] {
+            let (h, step, mut random) = (0.0025, 1e-5, Random(3));
+            let (mut q, mut dq, mut ddq) = (0.0, 0.1, 0.0);
+            let (mut t, mut positions, mut rates) = (vec![], vec![], vec![]);
+            for k in 0..800 {
+                if k % 50 == 0 {
+                    ddq = size * random.normal();
+                }
+                let now = h * f64::from(k);
+                t.push(now);
+                positions.push(((q + 0.3 * (2.0 * now).sin()) / step).round() * step);
+                rates.push(dq + 0.6 * (2.0 * now).cos());
+                q += h * (dq + 0.5 * h * ddq);
+                dq += h * ddq;
+            }
+            let track = Track::<1>::new("", &t, &positions, &vec![0.0; 800], Some([step]));
+            let ratio = claimed(&track, &rates);
+            assert!((0.6..1.7).contains(&ratio), "{size}: {ratio}");
+        }
     }
 }

@@ -69,6 +69,9 @@ fn impossible(effect: &EffectInstance, probability: f64) -> Option<String> {
         "joint_spring" if value < 0.0 && probability < RARE_VALUE_PROBABILITY => {
             Some("its stiffness is negative, which no spring's is".to_owned())
         }
+        "load_dependent_friction" if value < 0.0 && probability < RARE_VALUE_PROBABILITY => {
+            Some("its friction falls with the load, which no bearing's or gear's does".to_owned())
+        }
         _ => None,
     }
 }
@@ -209,6 +212,9 @@ mod tests {
             ("joint_spring", [-2.0, 0.1, 0.0], vec![0.1, 0.1], 0.4, false),
             ("joint_spring", [-2.0, 0.1, 0.0], vec![0.1, 0.1], 0.9, true),
             ("joint_spring", [2.0, 0.1, 0.0], vec![0.1, 0.1], 0.4, true),
+            ("load_dependent_friction", [-0.1, 0.0, 0.0], vec![0.01], 0.8, false),
+            ("load_dependent_friction", [-0.1, 0.0, 0.0], vec![0.01], 0.95, true),
+            ("load_dependent_friction", [0.1, 0.0, 0.0], vec![0.01], 0.8, true),
             ("position_dependent_friction", [0.01, 0.5, 0.0], vec![0.1, 0.1], 0.9, true),
             ("torque_saturation", [12.0, 0.0, 0.0], vec![f64::INFINITY], 0.9, false),
         ] {

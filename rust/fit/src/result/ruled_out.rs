@@ -16,6 +16,9 @@ const PINNED: f64 = 0.5;
 /// Share of the remaining gap above which an effect that could explain as much is not called absent.
 const COULD_BE: f64 = 0.1;
 
+/// Why an effect is undecided that the training logs show and the holdout does not.
+const TRACED: &str = "it leaves a trace in the training logs, but does not reduce the gap on the holdout";
+
 /// Status of every candidate effect that is no cause, from its score test (first-order) around the final model.
 pub fn ruled_out<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     context: &DiagnosisContext<A, N, P>,
@@ -118,16 +121,14 @@ fn status<A, const N: usize, const P: usize>(
     let value = test.estimate.abs() + NORMAL_95 * sigma;
     let bound =
         Bound { parameter: parameter.name, value, unit: parameter.quantity.unit(rotary), level: 0.95 };
-    let traced = test.estimate.abs() > 3.0 * sigma;
+    let traced = is_traced(test);
     RuledOut {
         effect,
         joint,
         on: SeveralJoints::default(),
         status: if traced { Status::Undecided } else { Status::Absent },
         bound: Some(bound),
-        why: traced.then(|| {
-            "it leaves a trace in the training logs, but does not reduce the gap on the holdout".to_owned()
-        }),
+        why: traced.then(|| TRACED.to_owned()),
     }
 }
 
@@ -187,11 +188,50 @@ fn threshold_status(test: &ScoreTest) -> RuledOut {
     let spec = test.effect.law.spec();
     let (effect, joint) = (spec.name, test.effect.joint_number());
     let reached = test.distinct > 0.0 && test.information_sigma < 0.5;
-    let why = if reached {
-        "at trial values it would leave a trace that these logs do not show".to_owned()
-    } else {
-        format!("these logs never reach it; it needs {}", spec.excited_by)
+    let (status, why) = match () {
+        () if !reached => {
+            (Status::NotExcited, format!("these logs never reach it; it needs {}", spec.excited_by))
+        }
+        () if is_traced(test) => (Status::Undecided, TRACED.to_owned()),
+        () => {
+            (Status::Absent, "at trial values it would leave a trace that these logs do not show".to_owned())
+        }
     };
-    let status = if reached { Status::Absent } else { Status::NotExcited };
     RuledOut { effect, joint, on: SeveralJoints::default(), status, bound: None, why: Some(why) }
+}
+
+/// Whether the score test of an effect on the training logs finds a size of more than three standard deviations.
+fn is_traced(test: &ScoreTest) -> bool {
+    test.estimate.abs() > 3.0 * test.sigma.max(test.information_sigma)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use armgap_core::effect::find;
+
+    /// Score test of backlash with the estimated size `estimate` (1: that of the trial), standard deviation 0.1, or 2 where no trial size was reached.
+    fn of_backlash(estimate: f64, reached: bool) -> RuledOut {
+        let effect = EffectInstance::new(find::<f64>("backlash").unwrap(), 0, [0.01, 0.0, 0.0]);
+        let information_sigma = if reached { 0.1 } else { 2.0 };
+        threshold_status(&ScoreTest {
+            effect,
+            gain: 1.0,
+            estimate,
+            sigma: 0.1,
+            information_sigma,
+            imitation: Vec::new(),
+            size: estimate,
+            tested: 0,
+            distinct: 0.5,
+        })
+    }
+
+    #[test]
+    fn an_effect_with_a_threshold_is_absent_only_without_a_trace() {
+        assert_eq!(of_backlash(0.1, true).status, Status::Absent);
+        assert_eq!(of_backlash(0.9, true).status, Status::Undecided);
+        assert_eq!(of_backlash(0.9, true).why.as_deref(), Some(TRACED));
+        assert_eq!(of_backlash(0.9, false).status, Status::NotExcited);
+    }
 }

@@ -1,5 +1,6 @@
 //! Predictions of a serial arm's model with terms added, over short windows and over whole logs.
 
+use crate::log::track::LARGEST_ERROR;
 use crate::model::hypothesis::Hypothesis;
 use crate::predict::window::{Dataset, Window};
 use crate::serial::controller::closed_loop::ClosedLoop;
@@ -97,7 +98,8 @@ pub fn floor<const N: usize>(data: &Dataset<N>, noise: &[f64; N]) -> [f64; N] {
     let square = |w: &Window<N>, j: usize| -> f64 {
         let track = &data.tracks[w.track];
         let [vq, c, vdq] = w.initial_state.covariance[j];
-        let [mq, mdq] = w.initial_state.mean_square[j];
+        // This floor is not bounded by what a model misses, and one window with a jump must not raise it.
+        let [mq, mdq] = w.initial_state.mean_square[j].map(|error| error.min(LARGEST_ERROR));
         let at = |k: usize| {
             let t = track.t[k] - track.t[w.first];
             noise[j].powi(2) + vq * mq + 2.0 * t * c * (mq * mdq).sqrt() + t * t * vdq * mdq
