@@ -11,6 +11,7 @@ from typing import Any
 
 from armgap.diagnosis.result import MOST_BYTES, Cause, Diagnosis, Equivalent, RuledOut, Value
 from armgap.errors import OptionError
+from armgap.evidence.remainder import has_gap
 from armgap.files.reading import read_bounded
 from armgap.literals import CauseStatus, GapOutcome, Verdict, joint_units
 from armgap.log.findings import counted
@@ -22,14 +23,6 @@ _Key = tuple[_Place, str | None, int]
 SCHEMA = "armgap.diagnosis/1"
 #: Ratios of the gap above the noise floor, after to before, at which it counts as smaller or larger: different motions vary it by less.
 SMALLER, LARGER = 0.8, 1.25
-#: Verdicts with which a model has a gap beyond chance, by model; with causes that were named there may be one.
-_WITH_GAP: dict[str, tuple[Verdict, ...]] = {
-    "before": ("parameters", "effect", "unexplained", "input"),
-    "refit": ("effect", "unexplained", "input"),
-    "after": ("effect", "unexplained", "input"),
-}
-#: Ratio of prediction errors to the noise floor up to which named causes leave no gap: complete models reach 1.7 on short holdouts.
-WITHIN_FLOOR = 2.0
 #: A parameter has changed if it differs by more than so many standard deviations of the difference, and by more than this share of itself.
 SIGMAS, SHARE = 3.0, 0.02
 
@@ -205,7 +198,7 @@ def compare(before: Diagnosis, after: Diagnosis, names: tuple[str, str] = ("befo
     _check(before, after)
     gaps = tuple(_gap(before, after, model) for model in ("before", "refit", "after"))
     return Comparison(
-        _outcome(gaps[0].factor, _has_gap(after, "before")),
+        _outcome(gaps[0].factor, has_gap(after.to_dict(), "before")),
         before.verdict,
         after.verdict,
         gaps,
@@ -246,18 +239,9 @@ def _gap(before: Diagnosis, after: Diagnosis, model: str) -> GapChange:
 
 def _above(diagnosis: Diagnosis, model: str) -> list[float]:
     """Return a model's prediction errors above the noise floor, per joint; zero where they are no gap."""
-    if not _has_gap(diagnosis, model):
+    if not has_gap(diagnosis.to_dict(), model):
         return [0.0] * len(diagnosis.gap.floor)
     return [max(v - f, 0.0) for v, f in zip(getattr(diagnosis.gap, model), diagnosis.gap.floor, strict=True)]
-
-
-def _has_gap(diagnosis: Diagnosis, model: str) -> bool:
-    if diagnosis.verdict not in _WITH_GAP[model]:
-        return False
-    if model != "after" or diagnosis.verdict != "effect":
-        return True
-    gap = diagnosis.gap
-    return any(v > WITHIN_FLOOR * f for v, f in zip(gap.after, gap.floor, strict=True))
 
 
 def _outcome(factor: float | None, has_gap: bool) -> GapOutcome:
