@@ -189,7 +189,7 @@ def test_no_motion_tells_a_tilted_base_from_an_encoder_offset(limited):
     question = next(q for q in made.questions if {q.effect, q.against} == {"base_tilt", "encoder_offset"})
     assert question.settled < UNSETTLED
     assert "does not tell them apart" in question.why
-    assert "no motion" in made.summary()
+    assert "does not tell them apart" in made.summary()
 
 
 @pytest.mark.parametrize(("trust", "low", "high"), [(100.0, 0.0, UNSETTLED), (1e-4, 0.9, 1.0)])
@@ -448,7 +448,9 @@ def test_a_usual_motion_that_cannot_be_predicted_names_the_limits(diagnosis, lim
         raise ValueError
 
     monkeypatch.setattr(PredictedMotion, "sensitivities", diverges)
-    with pytest.raises(OptionError, match=r"cannot be predicted along a motion within these limits.*widen position_min"):
+    with pytest.raises(
+        OptionError, match=r"cannot be predicted along a motion within these limits.*widen position_min"
+    ):
         plan(diagnosis, limited, questions=["backlash:2"], duration=DURATION)
 
 

@@ -11,10 +11,10 @@ from typing import Any
 
 from armgap.diagnosis.result import MOST_BYTES, Cause, Diagnosis, Equivalent, RuledOut, Value
 from armgap.errors import OptionError
-from armgap.evidence.remainder import has_gap
 from armgap.files.reading import read_bounded
 from armgap.literals import CauseStatus, GapOutcome, Verdict, joint_units
 from armgap.log.findings import counted
+from armgap.remainder import has_gap
 
 __all__ = ["CauseChange", "Comparison", "GapChange", "ParameterChange", "compare", "read_diagnosis"]
 

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from typing import Any
 
 from armgap import _native
-from armgap.evidence.remainder import leaves_part
 from armgap.literals import SERIAL
+from armgap.remainder import leaves_part
 from armgap.report.words import doubtful, named, percent, title
 
 __all__ = ["next_steps"]

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 from armgap import _native
 from armgap._renamed import old_names
-from armgap.evidence.remainder import exceeds_floor, leaves_part
 from armgap.literals import SERIAL, joint_units
+from armgap.remainder import exceeds_floor, leaves_part
 from armgap.several_joints import place_text
 
 __all__ = [

@@ -36,5 +36,6 @@ def exceeds_floor(data: Data, model: str) -> bool:
 
 def leaves_part(data: Data) -> bool:
     """Whether the causes that a diagnosis names leave a large part of the gap."""
-    left = float(data["gap"].get("unexplained", 0.0))
-    return bool(data.get("causes")) and left > REMAINDER and has_gap(data, "after")
+    if not data.get("causes"):
+        return False
+    return float(data["gap"].get("unexplained", 0.0)) > REMAINDER and has_gap(data, "after")
