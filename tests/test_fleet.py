@@ -20,10 +20,10 @@ from armgap import Arm
 from armgap.errors import OptionError
 from armgap.fleet import Entry, Fleet, read_manifest, run_fleet
 from armgap.fleet.manifest import ManifestError
-from armgap.fleet.page import fleet_document
+from armgap.fleet.page import fleet_document, moved
 from armgap.fleet.series import moving, odd
-from armgap.fleet.tables import PARAMETERS, SUMMARY
-from armgap.fleet.work import answer, answer_within
+from armgap.fleet.tables import PARAMETERS, SUMMARY, owner
+from armgap.fleet.work import answer, answer_within, content_keys
 from fleet_size.broken import WAYS
 from fleets import fleet_of
 from swings import off, swing
@@ -193,12 +193,74 @@ def test_forms_of_a_manifest(place: Path) -> None:
         ("robot,arm,logs\na,,c\n", "`arm`.*row 1.*is empty"),
         ("robot,arm,logs,time\na,b,c,noon\n", "`time`.*row 1.*`noon` is no time"),
         ("robot,arm,logs,colour\na,b,c,red\n", "`colour`.*is no column"),
+        ("robot,arm,logs\na, ;,c\n", "m.csv, column `arm`, row 1: is empty"),
+        ("robot,arm,logs\na,b,c\n  ,b,c\n", "m.csv, column `robot`, row 2: is empty"),
+        ("robot,arm,logs\na,b, ; \n", "m.csv, column `logs`, row 1: is empty"),
+        ("robot,arm,logs\na,b;d,c\n", "m.csv, column `arm`, row 1: names 2 arm files"),
+        ("robot,arm,logs,time\na,b,c,\nz,b,c,\na,b, c,2026-01-01\n", "m.csv, row 3: repeats row 1"),
     ],
 )
 def test_manifests_that_are_none(tmp_path: Path, text: str, said: str) -> None:
     (tmp_path / "m.csv").write_text(text, encoding="utf-8")
     with pytest.raises(ManifestError, match=said):
         read_manifest(tmp_path / "m.csv")
+
+
+def test_values_of_a_manifest_in_toml(tmp_path: Path) -> None:
+    file = tmp_path / "m.toml"
+    file.write_text('[[entry]]\nrobot = 0\narm = "b"\nlogs = "c"\n', encoding="utf-8")
+    assert read_manifest(file)[0].robot == "0"
+    for wrong in ('robot = ["A"]\narm = "b"', 'robot = "A"\narm = {x = 1}', 'robot = "A"\narm = [[1]]'):
+        file.write_text(f'[[entry]]\n{wrong}\nlogs = "c"\n', encoding="utf-8")
+        with pytest.raises(ManifestError, match=r"row 1: .* is no text"):
+            read_manifest(file)
+
+
+def test_results_belong_to_the_description_and_to_the_files_of_a_folder(tmp_path: Path) -> None:
+    (tmp_path / "arm.toml").write_text(
+        'kind = "serial"\nurdf = "robot.urdf"\nsample_period = 0.002\n', encoding="utf-8"
+    )
+    bag = tmp_path / "bag"
+    (bag / "parts").mkdir(parents=True)
+    entry = Entry("A", str(tmp_path / "arm.toml"), (str(bag),), (), "", 1)
+
+    def describe(mass: float) -> None:
+        (tmp_path / "robot.urdf").write_text(
+            f"""<robot name="one"><link name="base"/><link name="l"><inertial><origin xyz="0 0 -0.3"/><mass value="{mass}"/>
+            <inertia ixx="0.05" ixy="0" ixz="0" iyy="0.05" iyz="0" izz="0.01"/></inertial></link><joint name="j" type="continuous">
+            <parent link="base"/><child link="l"/><axis xyz="0 1 0"/></joint></robot>""",
+            encoding="utf-8",
+        )
+
+    def key() -> str:
+        return content_keys([entry], {})[entry]
+
+    seen = [key()]  # the description is missing
+    for change in (
+        lambda: describe(4.0),
+        lambda: describe(8.0),
+        lambda: (bag / "metadata.yaml").write_text("a"),
+        lambda: (bag / "parts" / "0.db3").write_text("b"),
+        lambda: (bag / "parts" / "0.db3").rename(bag / "0.db3"),
+        lambda: (bag / "0.db3").write_text("c"),
+    ):
+        change()
+        seen.append(key())
+    assert len(set(seen)) == len(seen)
+    (bag / "0.db3").touch()
+    assert key() == seen[-1]
+
+
+def test_a_coupled_transmission_that_drifts_has_a_place_in_words() -> None:
+    values = fleet_of(np.random.default_rng(5), 7)
+    cause = {"effect": "coupled_transmission", "joint": None, "joints": [1, 2], "row": [1, -1]}
+    rows = [
+        (f"robot {i}", f"2026-01-{k + 1:02d}T00:00:00", owner(cause), "viscous", float(v), 0.05, "N m s/rad")
+        for i, row in enumerate(values)
+        for k, v in enumerate(row)
+    ]
+    [move] = moving(pl.DataFrame(rows, schema=PARAMETERS, orient="row"))
+    assert "viscous of transmission that couples two joints, difference of joints 1 and 2 by +" in moved(move)
 
 
 def test_what_is_no_manifest(tmp_path: Path) -> None:

@@ -6,7 +6,8 @@ import numpy as np
 import polars as pl
 import pytest
 
-from armgap.fleet.drift import FALSE_ALARMS, drifts, fleet_autocorrelation, fleet_scatter, odd_ones, relative, threshold
+from armgap.fleet.drift import FALSE_ALARMS, drifts, fleet_autocorrelation, fleet_scatter, relative, threshold
+from armgap.fleet.outliers import odd_ones
 from armgap.fleet.series import moving, series_of
 from armgap.fleet.tables import PARAMETERS
 from fleet_drift.judging import ask, in_time, report
@@ -223,18 +224,68 @@ def test_a_drift_says_when_or_at_which_visit() -> None:
     assert (counted.since, counted.visit) == ("", dated.visit)
 
 
+def test_a_drift_is_counted_in_all_visits_of_the_robot() -> None:
+    """Every second visit has no estimate: the friction rises by 3 % per visit all the same."""
+    values = fleet_of(np.random.default_rng(5), 7, visits=60)
+    rows = rows_of(values[:, :30])
+    full = [move.drift.rate for move in moving(rows)]
+    other = rows.with_columns(name=pl.lit("theta1"), value=pl.lit(1.0))
+    late = pl.col("time").str.slice(8, 2).cast(pl.Int64) % 2 == 0
+    [move] = moving(pl.concat([rows.filter((pl.col("robot") != robot_name(7)) | late), other]))
+    assert full == [pytest.approx(0.03, rel=0.4)]
+    assert move.drift.rate == pytest.approx(full[0], rel=0.4)
+    assert int(move.since[8:10]) == move.visit
+
+
 def test_a_robot_far_from_the_others_is_odd() -> None:
     values = fleet_of(np.random.default_rng(3), None)
     assert odd_ones(values) == []
     values[4] *= 2.0
-    [(robot, usual, fleet, apart)] = odd_ones(values)
-    assert robot == 4
-    assert usual == pytest.approx(2.0 * fleet, rel=0.2)
-    assert apart > 5
+    [found] = odd_ones(values)
+    assert found.robot == 4
+    assert found.usual == pytest.approx(2.0 * found.others, rel=0.2)
+    assert found.chance < 1e-6
     assert odd_ones(values[:3]) == []
+    # Two odd robots do not hide each other.
+    values[9] *= 2.0
+    assert {one.robot for one in odd_ones(values)} == {4, 9}
     # A third of the robots are not odd but another model.
     values[8:15] *= 2.0
     assert odd_ones(values) == []
+
+
+@pytest.mark.parametrize("robots", [4, 5, 10, 20])
+def test_of_like_robots_none_is_odd(robots: int) -> None:
+    """Of 150 fleets with nine parameters 4 % are expected at most, so that 14 have a probability below 1 %."""
+    rng = np.random.default_rng(robots)
+    fleets = (rng.normal(1.0, 0.04, (9, robots, 1)) for _ in range(150))
+    assert sum(any(odd_ones(values, tests=9 * robots) for values in fleet) for fleet in fleets) < 14
+
+
+@pytest.mark.parametrize("robots", [5, 20])
+def test_three_times_the_friction_is_odd_in_small_fleets_too(robots: int) -> None:
+    rng = np.random.default_rng(robots)
+    found = 0
+    for _ in range(20):
+        values = rng.normal(1.0, 0.04, (robots, 2))
+        values[2] *= 3.0
+        found += [one.robot for one in odd_ones(values, tests=9 * robots)] == [2]
+    assert found >= 18
+
+
+def test_visits_and_standard_errors_bound_what_is_odd() -> None:
+    """Four robots that agree by chance: what the visits scatter by, or the estimates say of themselves, is not undercut."""
+    rng = np.random.default_rng(17)
+    level = np.array([1.0, 1.00001, 0.99999, 1.02])[:, None]
+    scatter = np.array([[0.03, -0.03]])
+    assert [one.robot for one in odd_ones(np.hstack([level, level]))] == [3]
+    assert odd_ones(level + scatter) == []
+    assert odd_ones(level, np.full((4, 1), 0.02)) == []
+    assert odd_ones(np.ones((5, 3))) == []
+    # Values of both signs have no logarithm.
+    offsets = rng.standard_normal((20, 3))
+    offsets[6] += 20.0
+    assert [one.robot for one in odd_ones(offsets)] == [6]
 
 
 def test_the_study_judges_answers() -> None:

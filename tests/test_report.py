@@ -112,6 +112,45 @@ def test_a_doubtful_cause_is_called_so() -> None:
     assert "stays unexplained" in verdict(data)
 
 
+def with_errors(before: float, after: float, closed: float, low: float, unexplained: float) -> dict:
+    """The diagnosis with a cause, with errors in floors, shares, and the lower end of the interval of the share closed."""
+    data = copy.deepcopy(cases.named().to_dict())
+    floor = data["gap"]["floor"]
+    errors = {
+        "before": [before * f for f in floor],
+        "refit": [before * f for f in floor],
+        "after": [after * f for f in floor],
+    }
+    data["gap"] |= errors | {"closed": closed, "closed_ci": [low, max(closed, 0.0)], "unexplained": unexplained}
+    return data
+
+
+def test_a_large_rest_of_the_gap_is_said_first() -> None:
+    assert "stays unexplained" in verdict(with_errors(100.0, 60.0, 0.4, 0.2, 0.6))
+    assert any(
+        "leave 60\N{NO-BREAK SPACE}% of the gap" in step for step in next_steps(with_errors(100.0, 60.0, 0.4, 0.2, 0.6))
+    )
+    for little in (with_errors(100.0, 10.0, 0.9, 0.8, 0.1), with_errors(3.0, 1.5, 0.75, 0.5, 0.25)):
+        assert "unexplained" not in verdict(little)
+        assert not any("of the gap of the re-estimated" in step for step in next_steps(little))
+
+
+def test_a_gap_that_does_not_shrink_is_said_in_words() -> None:
+    grown = answers(with_errors(100.0, 286.0, -1.86, -4.0, 1.0))[2]
+    assert grown.headline == "The causes do not shrink the gap of the held-out motion"
+    assert "closed: below -100\N{NO-BREAK SPACE}% to 0\N{NO-BREAK SPACE}%" in grown.detail
+    nothing = answers(with_errors(1.2, 1.3, -0.5, -34225.45, 1.0))[2]
+    assert nothing.headline == "The held-out motion shows no gap to close"
+    assert "interval" not in nothing.detail
+
+
+@EVERY_CASE
+def test_the_floor_is_not_called_sensor_noise(case) -> None:
+    assert "a perfect model would miss by" in texts(case().to_dict())
+    for text in (diagnosis_report(case(), "gap.md"), diagnosis_report(case(), "gap.html")):
+        assert "sensor noise" not in text
+
+
 def test_several_pushes_are_counted_in_the_headline_and_told_apart_in_the_text() -> None:
     data = copy.deepcopy(cases.named().to_dict())
     push = data["causes"][0] | {"effect": "external_pulse"}
@@ -338,8 +377,8 @@ def test_what_to_do_next_follows_from_the_verdict_and_the_result() -> None:
     assert "do not tell" not in " ".join(next_steps(effect))
     effect["causes"][0]["equivalents"] = [{"effect": "backlash", "joint": 1, "why": "both act at reversals"}]
     assert "do not tell Stribeck friction (stiction), joint 1, from backlash" in next_steps(effect)[0]
-    effect["gap"]["closed"] = 0.5
-    assert "50\N{NO-BREAK SPACE}% of the gap above the floor stays" in next_steps(effect)[-1]
+    effect["gap"] |= {"unexplained": 0.5, "after": [9.0 * f for f in effect["gap"]["floor"]]}
+    assert "leave 50\N{NO-BREAK SPACE}% of the gap" in next_steps(effect)[-1]
     assert "keep the arm file" in next_steps(none)[0]
     none["ruled_out"][0] |= {"effect": "backlash", "status": "not excited"}
     assert "acklash" in next_steps(none)[-1]

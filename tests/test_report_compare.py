@@ -54,6 +54,30 @@ def test_a_diagnosis_has_not_changed_against_itself() -> None:
     assert result.gap[0].factor == 1.0
 
 
+def test_noise_above_the_floor_of_healthy_arms_is_no_gap() -> None:
+    """Two diagnoses with verdict `none`, whose errors lie a little and a little more above their floors."""
+
+    def noisy(by: float) -> Diagnosis:
+        def errors(data: dict) -> None:
+            for model in ("before", "refit", "after"):
+                data["gap"][model] = [by * f for f in data["gap"]["floor"]]
+
+        return changed(cases.none(), errors)
+
+    result = compare(noisy(1.2), noisy(1.5))
+    assert result.outcome == "none"
+    assert [gap.factor for gap in result.gap] == [None] * 3
+    assert lead(result) == "There is no gap, neither before nor after."
+    assert "within what a perfect model would miss by" in answers(result)[1].detail
+    # Nor is what named causes leave within the floor; what they leave beyond is.
+    worn = changed(cases.named(), lambda data: data["gap"].update(after=[1.5 * f for f in data["gap"]["floor"]]))
+    assert compare(worn, worn).gap[2].factor is None
+    poor = changed(cases.named(), lambda data: data["gap"].update(after=[9.0 * f for f in data["gap"]["floor"]]))
+    assert compare(worn, poor).gap[2].factor is None
+    assert compare(poor, worn).gap[2].factor == 0.0
+    assert compare(poor, poor).gap[2].factor == 1.0
+
+
 def test_a_cause_that_the_later_log_could_not_show_is_not_called_gone() -> None:
     def unexcited(data: dict) -> None:
         entry = next(r for r in data["ruled_out"] if r["effect"] == "stribeck")
@@ -79,6 +103,7 @@ def test_what_went_and_what_came_is_said_first() -> None:
 
     def as_before(data: dict) -> None:
         data["gap"]["before"] = list(cases.named().to_dict()["gap"]["before"])
+        data["verdict"] = "parameters"
 
     cured = compare(cases.named(), changed(cases.none(), as_before))
     assert cured.outcome == "unchanged"

@@ -155,3 +155,21 @@ def test_what_cannot_be_simulated_is_refused(change, says, arm):
     arguments = {"t": np.arange(10) * 0.01, "tau": np.zeros((10, 2))} | change
     with pytest.raises(OptionError, match=says):
         simulate(arm, **arguments)
+
+
+def test_the_seed_torques_of_ten_seconds_are_simulated_by_default(tmp_path):
+    """Dry friction that sticks and slides leaves 1.5e-9 rad at the smallest steps, more than the tolerance of a second."""
+    path = tmp_path / "arm.toml"
+    path.write_text(
+        'kind = "two-link"\nsample_period = 0.002\n[inertial]\ntheta = [1.3254, 0.3, 0.165, 27.6642, 5.886]\n'
+        "[friction]\nviscous = [1.0, 0.4]\ncoulomb = [3.0, 1.0]\n"
+    )
+    arm = Arm.read(path)
+    t = np.arange(5000) * arm.sample_period
+    assert len(simulate(arm, t, seed_torque(t))) == 5000
+    with pytest.raises(
+        OptionError, match=r"steps are halved; allow more with tolerance \(--tolerance\), which is 1e-12"
+    ):
+        simulate(arm, t, seed_torque(t), tolerance=1e-12)
+    with pytest.raises(OptionError, match="tolerance"):
+        simulate(arm, t, seed_torque(t), tolerance=0.0)

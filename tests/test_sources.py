@@ -13,7 +13,18 @@ MOST_LINES = 500
 PACKAGE = ROOT / "python" / "armgap"
 #: Modules and folders of the package in the order of the data, after what all use.
 ORDER = (
-    *("_native", "_renamed", "errors", "literals", "options", "files", "progress", "workers", "several_joints"),
+    *(
+        "_native",
+        "_renamed",
+        "errors",
+        "literals",
+        "options",
+        "files",
+        "progress",
+        "workers",
+        "several_joints",
+        "remainder",
+    ),
     *("log", "arm", "simulation", "check", "estimation", "evidence", "diagnosis", "export", "report"),
     *("inspection", "planning", "fleet", "reproduction", "trial", "cli", "own"),
 )

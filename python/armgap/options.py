@@ -8,10 +8,12 @@ from typing import Any
 
 from armgap.errors import OptionError
 
-__all__ = ["LARGEST_SEED", "not_an_arm", "positive", "seed", "whole"]
+__all__ = ["LARGEST_SEED", "LONGEST_PLAN_S", "SHORTEST_PLAN_S", "not_an_arm", "positive", "seed", "whole"]
 
 LARGEST_SEED = 2**64 - 1
 """Largest seed of the compiled core's random generator, which takes 64 bits."""
+SHORTEST_PLAN_S, LONGEST_PLAN_S = 2.0, 120.0
+"""Shortest and longest motion that can be planned [s]: two phases with their moves, and predictions of minutes."""
 
 
 def positive(value: Any, what: str, remedy: str = "give a positive number of seconds") -> float:

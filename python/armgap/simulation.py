@@ -16,7 +16,14 @@ from armgap.errors import OptionError
 from armgap.log.log import Log
 from armgap.progress import report_progress
 
-__all__ = ["Effect", "effects", "seed_torque", "simulate"]
+__all__ = ["TOLERANCE_RATE", "Effect", "effects", "seed_torque", "simulate"]
+
+TOLERANCE_RATE = 1e-9
+"""Default tolerance of a simulation per second [rad/s or m/s], as errors grow with time: far below the step of any encoder (10^-6 rad), and above
+what rounding leaves where joints with dry friction stick and slide, 1.5e-9 rad in 10 s.
+"""
+#: Words of the compiled core's error where the steps that it takes do not reach the tolerance.
+_NOT_REACHED = "when the steps are halved"
 
 
 @dataclass(frozen=True)
@@ -103,7 +110,7 @@ def simulate(
     encoder: bool = True,
     noise: float = 0.0,
     seed: int = 0,
-    tolerance: float = 1e-9,
+    tolerance: float | None = None,
     smoothing: ArrayLike = 0.0,
     sensor: bool = False,
     name: str = "simulated",
@@ -131,8 +138,8 @@ def simulate(
         Standard deviation of white noise on positions [rad or m], added before rounding.
     seed : int, default 0
         Seed of the noise.
-    tolerance : float, default 1e-9
-        Largest admissible change of a position when steps are halved [rad or m].
+    tolerance : float, optional
+        Largest admissible change of a position when steps are halved [rad or m]; by default `TOLERANCE_RATE` times the duration, at least 1 s.
     smoothing : float or array_like, shape (n_joints,), default 0
         Width of the friction regularisation [rad/s], of all joints or joint by joint; 0 is dry friction.
     sensor : bool, default False
@@ -162,6 +169,9 @@ def simulate(
         raise OptionError("`t` must increase and everything be finite", remedy="correct the torque table")
     if not (noise >= 0 and np.isfinite(noise)):
         raise OptionError(f"the noise is {noise}", remedy="give its standard deviation, 0 or more")
+    if tolerance is None:
+        tolerance = TOLERANCE_RATE * max(1.0, float(t[-1] - t[0]))
+    tolerance = options.positive(tolerance, "tolerance", remedy="give a positive number of rad or m")
     widths = np.broadcast_to(np.asarray(smoothing, dtype=np.float64), n).tolist()
     placed = [(e.name, e.joint, dict(e.parameters)) for e in effects]
     try:
@@ -188,7 +198,10 @@ def simulate(
             )
         q, dq = motion
     except (ValueError, TypeError, OverflowError) as error:
-        raise OptionError(str(error), remedy="see `armgap.effects()` and the arm file") from None
+        remedy = "see `armgap.effects()` and the arm file"
+        if _NOT_REACHED in str(error):
+            remedy = f"allow more with tolerance (--tolerance), which is {tolerance:.2g}, or simulate a shorter time"
+        raise OptionError(str(error), remedy=remedy) from None
     if noise > 0:
         with np.errstate(over="ignore"):
             q = q + noise * np.random.default_rng(seed).standard_normal(q.shape)

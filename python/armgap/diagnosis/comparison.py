@@ -14,6 +14,7 @@ from armgap.errors import OptionError
 from armgap.files.reading import read_bounded
 from armgap.literals import CauseStatus, GapOutcome, Verdict, joint_units
 from armgap.log.findings import counted
+from armgap.remainder import has_gap
 
 __all__ = ["CauseChange", "Comparison", "GapChange", "ParameterChange", "compare", "read_diagnosis"]
 
@@ -37,7 +38,8 @@ class GapChange:
     before, after : tuple of float
         RMS position error per joint [rad or m] in the earlier and in the later diagnosis.
     factor : float or None
-        Ratio of the gap above the noise floor, over all joints, in the later diagnosis to that in the earlier; None if there was no gap before.
+        Ratio of the gap above the noise floor, over all joints, in the later diagnosis to that in the earlier; 0 if none is left, None if there was
+        none before. By its verdict a diagnosis may say that a model has no gap; what lies above its floor is then chance.
     """
 
     model: str
@@ -107,7 +109,7 @@ class Comparison:
     Attributes
     ----------
     outcome : {"smaller", "larger", "unchanged", "none"}
-        Change of the gap between log and arm file; ``"none"``: no gap before or after.
+        Change of the gap between log and arm file; ``"none"``: no gap before or after, as with verdict ``"none"`` of both.
     verdict_before, verdict_after : str
         The verdicts of the two diagnoses.
     gap : tuple of GapChange
@@ -196,7 +198,7 @@ def compare(before: Diagnosis, after: Diagnosis, names: tuple[str, str] = ("befo
     _check(before, after)
     gaps = tuple(_gap(before, after, model) for model in ("before", "refit", "after"))
     return Comparison(
-        _outcome(gaps[0].factor, after),
+        _outcome(gaps[0].factor, has_gap(after.to_dict(), "before")),
         before.verdict,
         after.verdict,
         gaps,
@@ -230,18 +232,21 @@ def _check(before: Diagnosis, after: Diagnosis) -> None:
 def _gap(before: Diagnosis, after: Diagnosis, model: str) -> GapChange:
     first, last = (tuple(getattr(d.gap, model)) for d in (before, after))
     scale = [max(v, 1e-300) for v in first]
-    above = (_above(before, first), _above(after, last))
+    above = (_above(before, model), _above(after, model))
     size = [math.hypot(*(g / s for g, s in zip(a, scale, strict=True))) for a in above]
     return GapChange(model, first, last, size[1] / size[0] if size[0] > 0 else None)
 
 
-def _above(diagnosis: Diagnosis, values: tuple[float, ...]) -> list[float]:
-    return [max(v - f, 0.0) for v, f in zip(values, diagnosis.gap.floor, strict=True)]
+def _above(diagnosis: Diagnosis, model: str) -> list[float]:
+    """Return a model's prediction errors above the noise floor, per joint; zero where they are no gap."""
+    if not has_gap(diagnosis.to_dict(), model):
+        return [0.0] * len(diagnosis.gap.floor)
+    return [max(v - f, 0.0) for v, f in zip(getattr(diagnosis.gap, model), diagnosis.gap.floor, strict=True)]
 
 
-def _outcome(factor: float | None, after: Diagnosis) -> GapOutcome:
+def _outcome(factor: float | None, has_gap: bool) -> GapOutcome:
     if factor is None:
-        return "none" if after.verdict == "none" else "larger"
+        return "larger" if has_gap else "none"
     if factor < SMALLER:
         return "smaller"
     return "larger" if factor > LARGER else "unchanged"

@@ -154,7 +154,7 @@ def drive_chain(
     horizon : float
         Prediction horizon [s].
     floor : sequence of float, shape (n_joints,)
-        RMS errors that the sensors' noise alone leaves on the holdout [rad or m]; not used for serial arms.
+        RMS errors of a perfect model on the holdout [rad or m]; not used for serial arms.
 
     Returns
     -------

@@ -54,7 +54,7 @@ class Values:
 class GapAtHorizon:
     """RMS position errors per joint [rad or m] on the holdout at the prediction horizon `horizon_s` [s], for the models in `Gap`.
 
-    `before`: arm file; `refit`: parameters re-estimated; `after`: with the named causes; `floor`: measurement noise alone.
+    `before`: arm file; `refit`: parameters re-estimated; `after`: with the named causes; `floor`: of a perfect model.
     """
 
     horizon_s: float
@@ -96,7 +96,7 @@ class Gap:
         Prediction horizon [s].
     before, refit, after, floor : tuple of float
         RMS error with the arm file's parameters, with re-estimated parameters, with the named causes added, and by
-        measurement noise alone [rad or m].
+        a perfect model: noise, and errors of the measured starts carried along the window [rad or m].
     closed : float
         Share of the gap above the floor that is closed, over all joints.
     closed_ci : tuple of float

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from armgap.arm.arm import Arm, checked_arm
+from armgap.diagnosis.nominal import mismatch
 from armgap.diagnosis.result import Diagnosis
 from armgap.export.chain.planar import correct_planar
 from armgap.export.chain.serial import correct_serial
@@ -13,8 +14,6 @@ __all__ = ["STAGES", "correct"]
 
 #: Stages of a diagnosis that can be exported.
 STAGES = ("with_causes", "refit")
-#: Relative difference up to which parameters of arm file and diagnosis count as equal.
-_EQUAL_PARAMETER_TOLERANCE = 1e-9
 #: First words of the diagnosis' remark on gains of a position controller that were estimated.
 _ESTIMATED_GAINS = "gains of the controller, estimated"
 
@@ -68,21 +67,9 @@ def correct(diagnosis: Diagnosis, arm: Arm, *, stage: str = "with_causes", keep_
 def _check(diagnosis: Diagnosis, arm: Arm, stage: str) -> None:
     if stage not in STAGES:
         raise ExportError(f"`{stage}` is not a stage", remedy=f"stages: {', '.join(STAGES)}")
-    nominal = diagnosis.parameters["nominal"]
-    if set(nominal) != set(arm.parameter_names):
-        raise ExportError(
-            f"the diagnosis is of an arm with parameters {', '.join(nominal)}, the arm file's kind is `{arm.kind}`",
-            remedy="give the arm file of the diagnosis",
-            file=arm.path,
-        )
-    for name, stated in zip(arm.parameter_names, arm.theta, strict=True):
-        if abs(nominal[name].value - stated) > _EQUAL_PARAMETER_TOLERANCE * max(1.0, abs(stated)):
-            raise ExportError(
-                f"is {stated:.6g} in the arm file, but the diagnosis was made with {nominal[name].value:.6g}",
-                remedy="give the arm file of the diagnosis",
-                file=arm.path,
-                column=name,
-            )
+    if (found := mismatch(diagnosis, arm)) is not None:
+        problem, name = found
+        raise ExportError(problem, remedy="give the arm file of the diagnosis", file=arm.path, column=name)
 
 
 def _notes(diagnosis: Diagnosis, stage: str) -> tuple[str, ...]:

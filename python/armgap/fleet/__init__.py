@@ -9,7 +9,8 @@ file         what
 `folder`     the folder of results: one diagnosis per entry, tables, page; existing results are kept
 `tables`     rows of the tables
 `series`     parameters over the visits of all robots: drifting parameters, robots that differ
-`drift`      statistical tests for drift
+`drift`      statistical test for drift
+`outliers`   statistical test for robots that differ from the others
 `page`       HTML page of the whole fleet
 ===========  ===============================================================================
 """

@@ -1,4 +1,4 @@
-"""Parameters that grow from some visit on, and robots that differ from the others.
+"""Parameters that grow from some visit on.
 
 **Series.** Logarithms of a parameter's estimates, less the robot's own median and less the median of all robots of a day, as far as the latter
 varies by more than chance: a common change of all robots on a day is no drift.
@@ -34,7 +34,6 @@ __all__ = [
     "drifts",
     "fleet_autocorrelation",
     "fleet_scatter",
-    "odd_ones",
     "relative",
     "threshold",
 ]
@@ -60,10 +59,6 @@ _KNOWN = 1e6
 _MOST_CORRELATION = 0.9
 # Squared change of a logarithm that counts as zero, and accuracy of the fleet's scatter, relative to the largest change between two visits.
 _ZERO_SQUARED_CHANGE, _SCATTER_ACCURACY = 1e-30, 1e-6
-# Distance from the fleet's median, in robust standard deviations, from which a robot counts as different from the others.
-_ODD = 5.0
-# Share of robots far from the median from which the fleet counts as one of several models of robots, and no robot as different.
-_SEVERAL_MODELS = 0.2
 # Ratio of the standard deviation of normally distributed numbers of mean zero to the median of their absolute values.
 _MAD = 1.4826
 
@@ -79,7 +74,7 @@ class Drift:
     onset : int
         Column of the table from which the parameter changes.
     rate : float
-        Relative change per visit of the robot.
+        Relative change per visit of the robot, visits without an estimate of the parameter included.
     evidence : float
         Difference of the rate from zero, in its standard deviations.
     threshold : float
@@ -93,7 +88,9 @@ class Drift:
     threshold: float
 
 
-def drifts(values: Array, sigma: Array | None = None, *, tests: int | None = None) -> list[Drift]:
+def drifts(
+    values: Array, sigma: Array | None = None, *, visits: Array | None = None, tests: int | None = None
+) -> list[Drift]:
     """Return drifts of one parameter: series with a ramp up to their last visit, strongest evidence first.
 
     Parameters
@@ -103,6 +100,8 @@ def drifts(values: Array, sigma: Array | None = None, *, tests: int | None = Non
         robots of fewer than six visits.
     sigma : ndarray, shape (n_robots, n_visits), optional
         Standard errors of the values; unknown (NaN) ones count as zero, and so do all by default.
+    visits : ndarray, shape (n_robots, n_visits), optional
+        Number of each visit among all visits of its robot, with a value of the parameter or without; by default the number of the column.
     tests : int, optional
         Number of series tested, over all parameters; by default the robots of this parameter.
     """
@@ -110,19 +109,25 @@ def drifts(values: Array, sigma: Array | None = None, *, tests: int | None = Non
     long = np.count_nonzero(np.isfinite(series), axis=1) >= _FEWEST_BEFORE + _FEWEST_ON
     if not long.any():
         return []
-    scatter, dispersion, freedom = fleet_scatter(series, error)
+    numbers = _numbers(series, visits)
+    scatter, dispersion, freedom = fleet_scatter(series, error, numbers)
     correlation = fleet_autocorrelation(series)
     allowed = FALSE_ALARMS / max(tests or len(series), 1)
     found = []
     for robot in np.flatnonzero(long):
-        visits = np.flatnonzero(np.isfinite(series[robot]))
-        square = error[robot, visits] ** 2
+        columns = np.flatnonzero(np.isfinite(series[robot]))
+        square = error[robot, columns] ** 2
         before = correlation**2 * np.roll(square, 1)
         before[0] = -(correlation**2) * square[0]  # the first equation is scaled by sqrt(1 - rho^2)
         weight = 1.0 / (dispersion[robot] * (scatter**2 * (1.0 + correlation) + square + before) + _ZERO_SQUARED_CHANGE)
-        equations = _Equations(series[robot, visits], weight, correlation)
-        found.append(_drift(equations, visits, int(robot), float(freedom[robot]), allowed))
+        equations = _Equations(series[robot, columns], numbers[robot, columns], weight, correlation)
+        found.append(_drift(equations, columns, int(robot), float(freedom[robot]), allowed))
     return sorted((drift for drift in found if drift is not None), key=lambda drift: -drift.evidence)
+
+
+def _numbers(series: Array, visits: Array | None) -> Array:
+    """Return the numbers of visits, by default those of the columns; shape of `series`."""
+    return np.broadcast_to(np.arange(series.shape[1], dtype=np.float64), series.shape) if visits is None else visits
 
 
 def relative(values: Array, sigma: Array | None = None) -> tuple[Array, Array]:
@@ -165,14 +170,17 @@ def _median(x: Array, axis: int) -> Array:
     return np.asarray(np.nanmedian(np.where(known, x, 0.0), axis=axis, keepdims=True))
 
 
-def fleet_scatter(series: Array, error: Array) -> tuple[float, Array, Array]:
+def fleet_scatter(series: Array, error: Array, visits: Array | None = None) -> tuple[float, Array, Array]:
     """Return the fleet's scatter from visit to visit, each robot's dispersion relative to it, and the dispersions' degrees of freedom.
 
     Parameters
     ----------
     series, error : ndarray, shape (n_robots, n_visits)
         Logarithms, NaN where unknown, and their standard errors.
+    visits : ndarray, shape (n_robots, n_visits), optional
+        Numbers of the visits, as for `drifts`.
     """
+    numbers = _numbers(series, visits)
     steps = _steps(series, error)
     count = np.count_nonzero(np.isfinite(steps[0]), axis=1)
     each, seen = _freedom(count), count > 0
@@ -192,7 +200,7 @@ def fleet_scatter(series: Array, error: Array) -> tuple[float, Array, Array]:
     agreed = min(_prior_freedom(raw[seen], each[seen]), float(each.sum()))
     prior = np.full(len(series), agreed)
     # Dispersion of each robot less its likeliest ramp, so that a steep drift does not count as scatter.
-    beside = _dispersions(_steps(np.array([_without_ramp(row) for row in series]), error), high)[seen]
+    beside = _dispersions(_steps(np.array(list(map(_without_ramp, series, numbers))), error), high)[seen]
     free = np.maximum(each[seen] - 2.0, 1.0)
     prior[seen] *= np.minimum(1.0, np.count_nonzero(seen) * _exceedance(beside * each[seen] / free, free, agreed))
     dispersion = np.where(seen, (prior + each * raw) / np.maximum(prior + each, _ZERO_SQUARED_CHANGE), 1.0)
@@ -266,13 +274,13 @@ def _prior_freedom(dispersion: Array, freedom: Array) -> float:
     return 1.0 + 2.0 / beyond if beyond > 2.0 / _KNOWN else _KNOWN
 
 
-def _without_ramp(row: Array) -> Array:
+def _without_ramp(row: Array, visits: Array) -> Array:
     """Return logarithms of one robot less the level and ramp that fit them best by least squares over all onsets; NaN where unknown."""
     known = np.flatnonzero(np.isfinite(row))
     rest = row.copy()
     if len(known) < _FEWEST_BEFORE + _FEWEST_ON:
         return rest
-    equations = _Equations(row[known], np.ones(len(known)), 0.0)
+    equations = _Equations(row[known], visits[known], np.ones(len(known)), 0.0)
     ramps = equations.beside(equations.ramps(), equations.level())
     level = equations.row - np.mean(equations.row)
     slope = ramps @ level / np.sum(ramps**2, axis=1)
@@ -309,13 +317,14 @@ class _Equations:
 
     Attributes
     ----------
-    row, weight : ndarray, shape (n_visits,)
-        Logarithms of one robot's parameter by visit, and the inverse variance of each equation.
+    row, visits, weight : ndarray, shape (n_visits,)
+        Logarithms of one robot's parameter by visit, numbers of these visits, and the inverse variance of each equation.
     correlation : float
         First-order autocorrelation of deviations from visit to visit.
     """
 
     row: Array
+    visits: Array
     weight: Array
     correlation: float
 
@@ -327,9 +336,9 @@ class _Equations:
         return white
 
     def ramps(self) -> Array:
-        """Return ramps of slope 1 from every onset, shape (n_onsets, n_visits)."""
+        """Return ramps of slope 1 per visit from every onset, shape (n_onsets, n_visits)."""
         onsets = np.arange(_FEWEST_BEFORE, len(self.row) - _FEWEST_ON + 1)
-        return self.whitened(np.maximum(np.arange(len(self.row)) - onsets[:, None] + 1.0, 0.0))
+        return self.whitened(np.maximum(self.visits - self.visits[onsets, None] + 1.0, 0.0))
 
     def beside(self, x: Array, y: Array) -> Array:
         """Return rows of `x` less their weighted projection on the rows of `y`, shapes (n, n_visits) or (n_visits,)."""
@@ -356,40 +365,14 @@ class _Equations:
         return float(np.min(np.sign(part.sum()) * part / np.sqrt(square)))
 
 
-def _drift(equations: _Equations, visits: NDArray[np.intp], robot: int, freedom: float, allowed: float) -> Drift | None:
+def _drift(
+    equations: _Equations, columns: NDArray[np.intp], robot: int, freedom: float, allowed: float
+) -> Drift | None:
     slopes, deviations, length = equations.slopes()
     evidence = np.abs(slopes) / deviations
     best = int(np.argmax(evidence))
     needed = threshold(allowed, length, freedom)
     if evidence[best] <= needed or equations.without_one(best) < _MIN_REMAINING_EVIDENCE * evidence[best]:
         return None
-    onset = int(visits[best + _FEWEST_BEFORE])
+    onset = int(columns[best + _FEWEST_BEFORE])
     return Drift(robot, onset, float(np.expm1(slopes[best])), float(evidence[best]), needed)
-
-
-def odd_ones(values: Array) -> list[tuple[int, float, float, float]]:
-    """Return the robots whose median value is far from the others', the farthest first; none if many are far, as in a fleet of several models.
-
-    Parameters
-    ----------
-    values : ndarray, shape (n_robots, n_visits)
-        One parameter; NaN where it was not estimated.
-
-    Returns
-    -------
-    list of (robot, usual, fleet, apart)
-        Row of the robot, median of its visits, median of all robots' medians, and robust standard deviations between both medians.
-    """
-    usual = np.array([np.median(row[np.isfinite(row)]) if np.isfinite(row).any() else np.nan for row in values])
-    known = np.isfinite(usual)
-    if np.count_nonzero(known) < _FEWEST_ROBOTS:
-        return []
-    fleet = float(np.median(usual[known]))
-    spread = _MAD * float(np.median(np.abs(usual[known] - fleet)))
-    if spread <= 0:
-        return []
-    apart = (usual - fleet) / spread
-    far = [int(i) for i in np.argsort(-np.abs(apart)) if known[i] and abs(apart[i]) > _ODD]
-    if len(far) > max(1.0, _SEVERAL_MODELS * np.count_nonzero(known)):
-        return []
-    return [(i, float(usual[i]), fleet, float(apart[i])) for i in far]

@@ -15,7 +15,7 @@ from armgap.files.output import write
 from armgap.fleet.engines import ENGINES
 from armgap.fleet.manifest import Entry
 from armgap.fleet.tables import PARAMETERS, SUMMARY, failed_row, parameter_rows, summary_rows
-from armgap.fleet.work import Outcome, content_key
+from armgap.fleet.work import Outcome, content_keys
 
 __all__ = ["LIMIT_S", "Fleet", "belongs", "run_fleet"]
 
@@ -77,8 +77,8 @@ def run_fleet(
     entries : sequence of Entry
         Entries of a manifest, see `read_manifest`.
     folder : path-like
-        Folder of results, made if missing. Results belong to the content of logs and arm file, the settings and the version; entries whose process
-        died or took too long are tried again by the next run.
+        Folder of results, made if missing. Results belong to the content of logs, arm file and the description that it names, the settings and the
+        version; entries whose process died or took too long are tried again by the next run.
     settings : mapping, optional
         Keyword arguments of `armgap.diagnose`, such as ``horizon``.
     engine : str, default "local"
@@ -112,7 +112,7 @@ def run_fleet(
     except OSError as error:
         raise ResultError(f"cannot be made ({error.strerror or error})", remedy="choose another", file=place) from None
     settings = dict(settings or {})
-    keys = {entry: content_key(entry, settings) for entry in entries}
+    keys = content_keys(entries, settings)
     lost: dict[str, Outcome] = {}
     open_entries = {key: entry for entry, key in keys.items() if again or not _stands(place, key)}
     say = progress or (lambda done, total: None)
@@ -131,7 +131,8 @@ def run_fleet(
             else:
                 _keep(place, keys[entry], outcome)
             say(count, len(open_entries))
-    return _written(folder, keys, lost, len(open_entries), settings)
+    answered = sum(key in open_entries for key in keys.values())
+    return _written(folder, keys, lost, answered, settings)
 
 
 def _file(place: Path, key: str, *, failed: bool = False) -> Path:

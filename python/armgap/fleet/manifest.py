@@ -72,7 +72,8 @@ def read_manifest(path: str | Path) -> list[Entry]:
     Raises
     ------
     ManifestError
-        If the manifest cannot be read, lacks a column, or has a row without robot, arm or log, or with an invalid time.
+        If the manifest cannot be read, lacks a column, or has a row without robot, arm or log, with several arms, with an invalid time, or that
+        repeats another one.
     OptionError
         If the name does not end in ``.csv``, ``.parquet`` or ``.toml``.
     """
@@ -89,7 +90,9 @@ def read_manifest(path: str | Path) -> list[Entry]:
         raise ManifestError(f"cannot be read: {reason}", remedy="correct the file", file=path) from None
     if not rows:
         raise ManifestError("holds no entry", remedy="write one row per diagnosis", file=path)
-    return [_entry(row, number, path) for number, row in enumerate(rows, start=1)]
+    entries = [_entry(row, number, path) for number, row in enumerate(rows, start=1)]
+    _check_repeated(entries, path)
+    return entries
 
 
 def _csv(path: Path) -> list[dict[str, Any]]:
@@ -120,17 +123,40 @@ def _entry(row: dict[str, Any], number: int, manifest: Path) -> Entry:
     for name in _NEEDED:
         if name not in row:
             raise ManifestError("is missing", remedy=f"add the column {name}", file=manifest, column=name)
-        if not row[name]:
+    arms, logs, holdout = (_places(row.get(name), manifest, name, number) for name in ("arm", "logs", "holdout"))
+    robot = _word(row["robot"], manifest, "robot", number)
+    for name, found in (("robot", robot), ("arm", arms), ("logs", logs)):
+        if not found:
             raise ManifestError("is empty", remedy="fill it in", file=manifest, column=name, row=number)
-    logs, holdout = (_places(row.get(name), manifest) for name in ("logs", "holdout"))
-    [arm] = _places(row["arm"], manifest)[:1]
-    return Entry(str(row["robot"]), arm, logs, holdout, _time(row.get("time"), manifest, number), number)
+    if len(arms) > 1:
+        problem = f"names {len(arms)} arm files"
+        raise ManifestError(problem, remedy="name one, as a robot has one arm", file=manifest, column="arm", row=number)
+    return Entry(robot, arms[0], logs, holdout, _time(row.get("time"), manifest, number), number)
 
 
-def _places(value: Any, manifest: Path) -> tuple[str, ...]:
-    words = value if isinstance(value, list) else str(value or "").split(_SEPARATOR)
-    stripped = [str(word).strip() for word in words]
+def _places(value: Any, manifest: Path, column: str, number: int) -> tuple[str, ...]:
+    """Return the paths or URLs of a cell: a list, or text with separators."""
+    words = value if isinstance(value, list) else _word(value, manifest, column, number).split(_SEPARATOR)
+    stripped = [_word(word, manifest, column, number) for word in words]
     return tuple(word if is_url(word) else str(manifest.parent / word) for word in stripped if word)
+
+
+def _word(value: Any, manifest: Path, column: str, number: int) -> str:
+    """Return a cell as text without blanks around it; empty for none."""
+    if value is not None and (isinstance(value, bool) or not isinstance(value, str | int | float)):
+        raise ManifestError(f"`{value}` is no text", remedy="write text", file=manifest, column=column, row=number)
+    return "" if value is None else str(value).strip()
+
+
+def _check_repeated(entries: list[Entry], manifest: Path) -> None:
+    """Raise an error if two rows are one recording of one robot, which would count as two visits."""
+    first: dict[tuple[Any, ...], int] = {}
+    for entry in entries:
+        recording = (entry.robot, entry.arm, entry.logs, entry.holdout)
+        if recording in first:
+            problem = f"repeats row {first[recording]}: the same robot, arm and logs"
+            raise ManifestError(problem, remedy="remove one of the two rows", file=manifest, row=entry.row)
+        first[recording] = entry.row
 
 
 def _time(value: Any, manifest: Path, number: int) -> str:

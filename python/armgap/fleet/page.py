@@ -8,7 +8,9 @@ import numpy as np
 import polars as pl
 
 from armgap.fleet.drift import FALSE_ALARMS
-from armgap.fleet.series import Move, Odd, moving, odd
+from armgap.fleet.outliers import FALSE_FLEETS, FEWEST_ROBOTS
+from armgap.fleet.series import Move, Odd, moving, numbered, odd
+from armgap.fleet.tables import owner_text
 from armgap.report import charts
 from armgap.report.document import Document
 from armgap.report.page import Bar, Drawing, Section, Table
@@ -22,6 +24,8 @@ __all__ = ["fleet_document", "moved", "plain_time"]
 
 # Charts and table rows that the fleet's page shows at most; the tables on disk hold all.
 _CHARTS, _MAX_TABLE_ROWS = 6, 40
+# Digits of values that differ, and difference in percent from which only the values are given.
+_DIGITS, _MOST_PERCENT = 4, 1e3
 _EMPTY = "-"
 _MIDNIGHT = "T00:00:00"
 
@@ -61,15 +65,18 @@ def plain_time(time: str | None) -> str:
 
 
 def _odd_one(found: Odd) -> str:
-    return f"{found.robot}: {_named(found.of, found.name)} is {figure(found.usual)}, the fleet's {figure(found.fleet)}"
+    usual, others = found.outlier.usual, found.outlier.others
+    values = f"{figure(usual, _DIGITS)}, the others' {figure(others, _DIGITS)}"
+    part = (usual - others) / abs(others) if others else 0.0
+    by = f" ({100 * part:+.2g} %)" if 0.0 < 100 * abs(part) < _MOST_PERCENT else ""
+    return f"{found.robot}: {_named(found.of, found.name)} is {values}{by}"
 
 
 def _named(of: str, name: str) -> str:
     if of == "arm":
         meaning = parameter_text("", name)
         return f"{meaning} ({name})" if meaning else name
-    effect, _, joint = of.partition(":")
-    return f"{name} of {title(effect)}, {joint_text(int(joint) if joint else None)}"
+    return f"{name} of {owner_text(of)}"
 
 
 def _listed(found: list[str], none: str, of: str) -> tuple[str, str]:
@@ -155,9 +162,10 @@ def _moving(parameters: pl.DataFrame, moves: list[Move]) -> Section:
 def _course(parameters: pl.DataFrame, move: Move) -> Drawing:
     """Return a chart of one robot's parameter over its visits, with its 95 % interval."""
     robot, of, name = move.robot, move.of, move.name
-    rows = parameters.filter((pl.col("robot") == robot) & (pl.col("of") == of) & (pl.col("name") == name)).sort("time")
+    of_robot = (pl.col("robot") == robot) & (pl.col("of") == of) & (pl.col("name") == name)
+    rows = numbered(parameters).filter(of_robot & pl.col("value").is_not_null())
     value, sigma = rows["value"].to_numpy(), rows["sigma"].fill_null(0.0).to_numpy()
-    visits = np.arange(1.0, len(value) + 1)
+    visits = rows["visit"].to_numpy().astype(np.float64)
     unit = rows["unit"][0] or ""
     chart = charts.figure(f"{robot}: {_named(of, name)}", "visit", f"{name} [{unit}]" if unit else name)
     chart.varea(visits, value - 1.96 * sigma, value + 1.96 * sigma, color=charts.MEASURED, alpha=0.25)
@@ -171,17 +179,32 @@ def _course(parameters: pl.DataFrame, move: Move) -> Drawing:
 
 def _odd(found: list[Odd]) -> Section:
     text = (
-        "A robot is odd if its usual value (median over its visits) lies more than five robust standard deviations from the fleet's median. "
-        "Where more than a fifth of the robots do, they are taken for arms of several models, and nothing is said."
+        "A robot is odd if its mean over its visits differs from the other robots' by more than their scatter and that of visits can make. "
+        f"One is called so in at most {100 * FALSE_FLEETS:.0f} % of fleets of like robots, all robots and parameters together. "
+        f"Few robots show large differences only, fewer than {FEWEST_ROBOTS} none. "
+        "Where more than a fifth of the robots differ, they are taken for arms of several models, and nothing is said."
     )
     rows = [
-        (o.robot, _named(o.of, o.name), figure(o.usual), figure(o.fleet), f"{o.apart:+.1f}")
+        (
+            o.robot,
+            _named(o.of, o.name),
+            figure(o.outlier.usual, _DIGITS),
+            figure(o.outlier.others, _DIGITS),
+            f"{o.outlier.apart:+.1f}",
+            figure(o.outlier.chance, 2),
+        )
         for o in found[:_MAX_TABLE_ROWS]
     ]
-    tables = (
-        [Table(("robot", "parameter", "its median", "the fleet's", "robust standard deviations"), rows)] if rows else []
+    header = (
+        "robot",
+        "parameter",
+        "its mean",
+        "the others'",
+        "standard deviations",
+        "probability in a fleet of like robots",
     )
-    return Section("Odd ones", text=[text], points=[] if rows else ["No robot is far from the others."], tables=tables)
+    points = [] if rows else ["No robot differs from the others by more than chance."]
+    return Section("Odd ones", text=[text], points=points, tables=[Table(header, rows)] if rows else [])
 
 
 def _failures(failed: pl.DataFrame) -> Section | None:

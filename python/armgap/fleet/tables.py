@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from typing import Any
 
 import polars as pl
 
 from armgap.fleet.manifest import Entry
-from armgap.several_joints import by_joint
+from armgap.report.words import title
+from armgap.several_joints import by_joint, joint_text, place_text
 
-__all__ = ["PARAMETERS", "SUMMARY", "failed_row", "parameter_rows", "summary_rows"]
+__all__ = ["PARAMETERS", "SUMMARY", "failed_row", "owner", "owner_text", "parameter_rows", "summary_rows"]
 
 Row = dict[str, Any]
 SUMMARY: dict[str, type[pl.DataType]] = {
@@ -35,7 +37,7 @@ PARAMETERS: dict[str, type[pl.DataType]] = {
     "sigma": pl.Float64,
     "unit": pl.String,
 }
-"""Columns of ``parameters.parquet``, one row per parameter of an entry; `of` is its owner, ``arm`` or ``effect:joint``."""
+"""Columns of ``parameters.parquet``, one row per parameter of an entry; `of` is its owner, ``arm`` or that of a cause, see `owner`."""
 
 
 def summary_rows(entry: Entry, diagnosis: dict[str, Any]) -> list[Row]:
@@ -64,11 +66,29 @@ def _empty(entry: Entry) -> Row:
     return {**dict.fromkeys(SUMMARY), "robot": entry.robot, "time": entry.time or None}
 
 
-def _place(cause: dict[str, Any]) -> str:
-    """Return the location of a cause as text: a joint, two joints with the sign of the second's motion, or empty."""
-    if cause.get("row"):
-        return f"{cause['joints'][0]}{'+' if cause['row'][1] > 0 else '-'}{cause['joints'][1]}"
-    return str(cause["joint"] or "")
+def owner(cause: dict[str, Any]) -> str:
+    """Return the owner of a cause's parameters: ``effect:2``; ``effect:1+2`` or ``1-2`` of two coupled joints; ``effect:`` of the whole arm."""
+    if not cause.get("row"):
+        return f"{cause['effect']}:{cause['joint'] or ''}"
+    sign = "+" if cause["row"][1] > 0 else "-"
+    return f"{cause['effect']}:{cause['joints'][0]}{sign}{cause['joints'][1]}"
+
+
+def owner_text(of: str) -> str:
+    """Return the owner of a cause's parameters (see `owner`) in words.
+
+    Examples
+    --------
+    >>> owner_text("stribeck:2"), owner_text("base_tilt:")
+    ('Stribeck friction (stiction), joint 2', 'tilted base, whole arm')
+    """
+    effect, _, place = of.partition(":")
+    if coupled := re.fullmatch(r"(\d+)([+-])(\d+)", place):
+        row = (1, 1 if coupled[2] == "+" else -1)
+        where = place_text({"joint": None, "joints": [int(coupled[1]), int(coupled[3])], "row": row})
+    else:
+        where = joint_text(int(place) if place else None)
+    return f"{title(effect)}, {where}"
 
 
 def parameter_rows(entry: Entry, diagnosis: dict[str, Any]) -> Iterator[Row]:
@@ -77,7 +97,7 @@ def parameter_rows(entry: Entry, diagnosis: dict[str, Any]) -> Iterator[Row]:
     arm = diagnosis["parameters"]["with_causes"]
     found = [("arm", name, value) for name, value in arm.items()]
     for cause in by_joint(diagnosis["causes"]):
-        of = f"{cause['effect']}:{_place(cause)}"
+        of = owner(cause)
         found += [(of, name, value) for name, value in cause["parameters"].items()]
     for of, name, value in found:
         yield {**place, "of": of, "name": name, **{key: value.get(key) for key in ("value", "sigma", "unit")}}

@@ -6,17 +6,19 @@ import hashlib
 import json
 import signal
 import time
-from collections.abc import Callable, Mapping
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import polars as pl
 
 from armgap._native import __version__
+from armgap.arm.serial.arm_file import DESCRIPTION_KEYS
 from armgap.errors import ArmgapError
 from armgap.fleet.manifest import Entry, is_url
 
-__all__ = ["Outcome", "answer", "answer_within", "content_key", "took_too_long"]
+__all__ = ["Outcome", "answer", "answer_within", "content_keys", "took_too_long"]
 
 Outcome = dict[str, Any]
 """Outcome of an entry: ``diagnosis`` (JSON text), ``error`` (one line), or ``lost`` (reason why there is neither); and ``seconds``."""
@@ -25,25 +27,60 @@ _ALARM_AGAIN_S = 0.5
 _READERS: dict[str, Callable[[str], pl.DataFrame]] = {".parquet": pl.read_parquet, ".csv": pl.read_csv}
 
 
-def content_key(entry: Entry, settings: Mapping[str, Any]) -> str:
-    """Return a hash of all that an entry's result depends on: content of its files (of a URL the address), settings and version.
+def content_keys(entries: Sequence[Entry], settings: Mapping[str, Any]) -> dict[Entry, str]:
+    """Return for each entry a hash of all that its result depends on: content of its files (of a URL the address), settings and version.
 
-    A file that cannot be read counts by its name, so that the entry is tried again once the file exists.
+    Files are the arm file, the robot's description that it names, and the logs; a folder counts by all files in it. A file that cannot be read
+    counts by its name, so that the entry is tried again once the file exists.
     """
-    mark = hashlib.sha256(json.dumps([__version__, dict(settings), len(entry.logs)], sort_keys=True).encode())
-    for place in entry.files:
-        mark.update(_digest(place))
-    return mark.hexdigest()[:24]
+    described = {arm: _described(arm) for arm in dict.fromkeys(entry.arm for entry in entries)}
+    keys = {}
+    for entry in entries:
+        mark = hashlib.sha256(json.dumps([__version__, dict(settings), len(entry.logs)], sort_keys=True).encode())
+        for place in entry.files:
+            mark.update(_digest(place))
+        mark.update(described[entry.arm])
+        keys[entry] = mark.hexdigest()[:24]
+    return keys
+
+
+def _described(arm_file: str) -> bytes:
+    """Return the arm with the description (URDF or MJCF, with included files and meshes) that its arm file names, or why it cannot be read."""
+    try:
+        data = tomllib.loads(Path(arm_file).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return b""
+    if not any(key in data for key in DESCRIPTION_KEYS):
+        return b""
+    from armgap.arm.arm import Arm
+
+    try:
+        return Arm.read(Path(arm_file)).to_toml().encode()
+    except ArmgapError as error:
+        return str(error).encode("utf-8", "surrogateescape")
 
 
 def _digest(place: str) -> bytes:
     if is_url(place):
         return hashlib.sha256(place.encode()).digest()
+    path = Path(place)
+    if path.is_dir():
+        return _folder_digest(path)
     try:
-        with Path(place).open("rb") as file:
+        with path.open("rb") as file:
             return hashlib.file_digest(file, "sha256").digest()
     except OSError:
         return hashlib.sha256(f"missing {place}".encode()).digest()
+
+
+def _folder_digest(folder: Path) -> bytes:
+    """Return the hash of a folder, such as a ROS bag: relative names and content of all files in it, sorted."""
+    mark = hashlib.sha256(b"folder")
+    for name, path in sorted((path.relative_to(folder).as_posix(), path) for path in folder.rglob("*")):
+        if path.is_file():
+            mark.update(hashlib.sha256(name.encode("utf-8", "surrogateescape")).digest())
+            mark.update(_digest(str(path)))
+    return mark.digest()
 
 
 def answer(entry: Entry, settings: Mapping[str, Any]) -> Outcome:

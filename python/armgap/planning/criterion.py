@@ -246,6 +246,11 @@ class PredictedMotion:
         """Return derivatives of the predictions by the values that every model fits, per prior standard deviation; shape (n_numbers, n_columns).
 
         The values are arm parameters; a delay of all torques, whose prior is one sample; widths of the smoothed sign of friction.
+
+        Raises
+        ------
+        ValueError
+            If the best model cannot be predicted along the motion.
         """
         if self._columns is None:
             self._columns = np.column_stack([*self._of_parameters(), *self._of_nuisances()])
@@ -270,10 +275,11 @@ class PredictedMotion:
         lead = latent(model.effects)
         for part in SMOOTHED:
             widths = tuple(max(part * speed, 2.0 * width) for width in model.smoothing or (0.0,) * arm.n_joints)
-            columns.append(
-                self.predicted(model.theta, model.effects, lead, widths)
-                - self.predicted(model.theta, model.effects, lead)
-            )
+            with suppress(
+                ValueError
+            ):  # friction so steep, as in a motion that is all but at rest, is none that a diagnosis could fit
+                rounded = self.predicted(model.theta, model.effects, lead, widths)
+                columns.append(rounded - self.predicted(model.theta, model.effects, lead))
         late = [EffectInstance("actuator_delay", j + 1, {"delay": arm.sample_period}) for j in range(arm.n_joints)]
         with suppress(ValueError):  # the model has as many effects as the simulator carries, as a rule with a delay
             delayed = self.predicted(model.theta, (*model.effects, *late), True)

@@ -52,13 +52,14 @@ def plan_document(plan: Plan) -> Document:
 def lead(plan: Plan) -> str:
     """Return a sentence on how many questions the planned motion is expected to settle."""
     sure = sum(q.settled >= SURE for q in plan.questions)
-    return f"One motion of {figure(plan.duration)} s, expected to settle {sure} of {_counted(len(plan.questions), 'open question')}."
+    open_questions = _counted(len(plan.questions), "open question")
+    return f"One motion of {figure(plan.duration)} s; {sure} of {open_questions} it settles with a probability of {percent(SURE)} or more."
 
 
 def answers(plan: Plan) -> list[SummaryAnswer]:
     """Return the summary answers of a plan's report: purpose, expected certainty, and questions that may stay open."""
     best = sorted(plan.questions, key=lambda q: -q.settled)
-    settled = [f"{_short(q)}: {percent(q.settled)}" for q in best]
+    settled = [f"{_asked(q)} {percent(q.settled)}" for q in best]
     unsettled = [q for q in best if q.why]
     left = f"Left out: {', '.join(plan.left_out)}." if plan.left_out else ""
     return [
@@ -70,8 +71,8 @@ def answers(plan: Plan) -> list[SummaryAnswer]:
         ),
         SummaryAnswer(
             "What will it not tell?",
-            "; ".join(_short(q) for q in unsettled) or "Nothing of what was asked is out of reach",
-            " ".join(f"{_short(q)}: {q.why}." for q in unsettled),
+            " ".join(_asked(q) for q in unsettled) or "Nothing of what was asked is out of reach",
+            " ".join(f"{_asked(q)} {q.why[:1].upper()}{q.why[1:]}." for q in unsettled),
         ),
     ]
 

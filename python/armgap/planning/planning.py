@@ -6,6 +6,7 @@ import json
 import math
 import os
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 
 from armgap import options
 from armgap.arm.arm import Arm, arm_of, only_planar
+from armgap.diagnosis.nominal import mismatch
 from armgap.diagnosis.result import Diagnosis
 from armgap.errors import OptionError, ResultError
 from armgap.files.output import STANDARD_STREAM, write
@@ -27,7 +29,7 @@ from armgap.planning.open_questions.hypotheses import HypothesisBuilder, TestedQ
 from armgap.planning.open_questions.questions import NONE, Question, asked, known_model, open_questions, rank, spelt
 from armgap.planning.open_questions.sizes import Scales
 from armgap.planning.outcome import Outcome
-from armgap.planning.search import Search, standard
+from armgap.planning.search import Search
 from armgap.progress import ProgressCallback, use_callback
 
 if TYPE_CHECKING:
@@ -41,8 +43,6 @@ Array = NDArray[np.float64]
 MOST_QUESTIONS = 5
 #: Log-likelihood ratio that a decision needs, in addition to the logarithm of the number of candidates.
 DECISION = 3.0
-#: Shortest and longest motion that can be planned, s.
-SHORTEST, LONGEST = 2.0, 120.0
 #: Expected log-likelihood ratio below which evidence counts as none.
 NEXT_TO_NOTHING = 1.0
 #: Part of the difference between two models, left after the rival is fitted, below which the models are equivalent.
@@ -257,8 +257,9 @@ def plan(
         A subclass of it, if the diagnosis, the arm or an option cannot be used, or nothing is open.
     """
     seconds = options.positive(duration, "duration")
-    if not SHORTEST <= seconds <= LONGEST:
-        raise OptionError(f"the duration is {seconds:g} s", remedy=f"give {SHORTEST:g} to {LONGEST:g} s")
+    shortest, longest = options.SHORTEST_PLAN_S, options.LONGEST_PLAN_S
+    if not shortest <= seconds <= longest:
+        raise OptionError(f"the duration is {seconds:g} s", remedy=f"give {shortest:g} to {longest:g} s")
     number = options.seed(seed)
     arm = arm_of(arm)
     only_planar(arm, "plan")
@@ -293,15 +294,13 @@ def _usable(diagnosis: Diagnosis | str | os.PathLike[str], arm: Arm) -> dict[str
             remedy="apply the remedy that it names and diagnose again",
             file=file,
         )
-    described = data.get("arm") or {}
-    if described.get("kind", arm.kind) != arm.kind or set(data["parameters"]["with_causes"]) != set(
-        arm.parameter_names
-    ):
-        raise OptionError(
-            f"is of an arm of kind {described.get('kind')!r}, the arm file's is {arm.kind!r}",
-            remedy="give the arm file that was diagnosed",
-            file=file,
-        )
+    described = (data.get("arm") or {}).get("kind", arm.kind)
+    if described != arm.kind:
+        problem = f"is of an arm of kind {described!r}, the arm file's is {arm.kind!r}"
+        raise OptionError(problem, remedy="give the arm file that was diagnosed", file=file)
+    if (found := mismatch(read, arm)) is not None:
+        problem, name = found
+        raise OptionError(problem, remedy="give the arm file that was diagnosed", file=arm.path, column=name)
     if "noise" not in data:
         raise OptionError(
             "says nothing of the noise", remedy="give the JSON that `armgap diagnose --json` wrote", file=file
@@ -314,13 +313,18 @@ def _plan(data: dict[str, Any], arm: Arm, wanted: Sequence[str], duration: float
     model, notes = known_model(data, arm)
     setting = Setting.of(data, model)
     search = Search(setting, limits, duration)
-    usual = search.play(search.motion(standard(arm.n_joints)))
+    usual = search.usual()
     builder = HypothesisBuilder(data, usual, _scales(arm, data, limits, usual, setting), model.effects)
     questions, remarks = open_questions(data)
     named = asked(wanted, data, arm)
     tested = []
     for question in named or questions:
-        if (one := builder.pose(question)) is not None:
+        try:
+            one = builder.pose(question)
+        except ValueError:
+            remarks.append(f"{question.text}: cannot be predicted along a motion within these limits")
+            continue
+        if one is not None:
             tested.append(one)
         else:
             remarks.append(f"{question.text}: these limits leave nothing that the diagnosed logs did not cover")
@@ -336,6 +340,9 @@ def _plan(data: dict[str, Any], arm: Arm, wanted: Sequence[str], duration: float
         else [q for q in questions if q.text not in settling]
     )
     if not chosen:
+        if remarks:
+            remedy = "ask for another effect with --for, or widen [limits]"
+            raise OptionError(f"nothing can be planned for: {remarks[0]}", remedy=remedy)
         raise OptionError("the diagnosis leaves nothing open", remedy="ask for an effect, such as --for backlash:2")
     candidates = len(data["causes"]) + len(data.get("candidates") or []) + len(data["ruled_out"])
     threshold = DECISION + math.log(max(candidates, 1))
@@ -369,11 +376,12 @@ def _against_look_alikes(
     known = {frozenset((p.question.place, p.question.rival)) for p in chosen}
     unseen = [p for p in chosen if p.question.against == NONE]
     likely = [q for p in unseen for q in builder.look_alikes(p)[:_TRIED]]
-    posed = [builder.pose(q) for q in likely if frozenset((q.place, q.rival)) not in known]
+    posed = []
+    for question in (q for q in likely if frozenset((q.place, q.rival)) not in known):
+        with suppress(ValueError):  # an imitation that cannot be predicted is none
+            posed.append(builder.pose(question))
     weighed = [(usual.outcome(p.quick), p) for p in posed if p is not None]
-    remarks += [
-        f"{p.question.text}: no motion within these limits tells them apart" for x, p in weighed if x.kept < IDENTICAL
-    ]
+    remarks += [f"{p.question.text}: a usual motion does not tell them apart" for x, p in weighed if x.kept < IDENTICAL]
     doubtful = sorted(((x.expected, p) for x, p in weighed if x.kept >= IDENTICAL), key=lambda x: x[0])
     return [p for _, p in doubtful][: MOST_QUESTIONS - len(chosen)]
 
@@ -430,7 +438,7 @@ def _obstacle(question: Question, outcome: Outcome, most: float) -> str:
     """Return the reason why a question may stay open after the motion."""
     other = "the arm's own values" if question.against == NONE else spelt(*question.rival)
     if outcome.kept < SAME and float(outcome.weight @ outcome.plain) > NEXT_TO_NOTHING:
-        return f"fitting {other} gives the same motion: no motion within these limits tells them apart"
+        return f"fitting {other} gives the same motion: this motion does not tell them apart"
     if most < NEXT_TO_NOTHING:
         return "none of the motions tried within these limits would show it"
     return (

@@ -32,6 +32,10 @@ _MAX_COMPARED_WINDOWS, FINALISTS = 20, 4
 _MAX_SCALING_STEPS = 12
 #: Factor per step by which a motion with a collision is scaled down.
 _SHRINK = 0.8
+#: Part of a motion whose torques stand for those of the smallest motion: friction and weight.
+_LEAST_SCALE = 1e-3
+#: Part of the torque that a motion may take from which friction and weight alone are named as what leaves no motion.
+_MOSTLY_CARRIED = 0.8
 #: Interval, in prediction steps, at which torques are checked while a motion is scaled down.
 COARSE = 4
 #: Number of poses per joint at which the torque left for accelerations is computed, and smallest value assumed for it, as a part of the limit.
@@ -157,15 +161,17 @@ class Search:
         h = self._setting.step * COARSE
         t = np.arange(0.0, motion.duration, h)
         for _ in range(_MAX_SCALING_STEPS):
-            states = motion.at(t)
-            tau = inverse_dynamics(self._setting.model, *states)
-            if effects:
-                tau = torque_with(self._setting.model, effects, t, states, tau)
-            ratio = float(np.max(np.abs(tau) / (part * limit)))
+            ratio = float(np.max(np.abs(self._torques(motion, effects, t)) / (part * limit)))
             if ratio <= 1.0:
                 return motion
             motion = motion.scaled(max(0.5, min(0.97, 0.98 / ratio)))
         return motion.scaled(0.0)
+
+    def _torques(self, motion: Motion, effects: Sequence[Any], t: Array) -> Array:
+        """Return the torques of a motion under the best model with some effects added, shape (n_times, n_joints)."""
+        states = motion.at(t)
+        tau = inverse_dynamics(self._setting.model, *states)
+        return torque_with(self._setting.model, effects, t, states, tau) if effects else tau
 
     def kept(self, motion: Motion, tested: Sequence[TestedQuestion]) -> Motion:
         """Scale a motion down until its torques suffice under every model in question and the arm is free of collision."""
@@ -173,6 +179,54 @@ class Search:
             largest = p.pair.alternatives[-1][1][-1]
             motion = self._allowed(motion, (largest,), TORQUE_MOST)
         return motion
+
+    def usual(self) -> PredictedMotion:
+        """Return a usual motion within the limits, by which sizes of effects are judged.
+
+        Raises
+        ------
+        OptionError
+            If the limits allow no motion, or none along which the best model can be predicted.
+        """
+        motion = build(
+            standard(len(self._limits.home)),
+            self._limits.home,
+            self._inner,
+            self._duration,
+            self._setting.arm.sample_period,
+        )
+        allowed = self._allowed(motion, (), TORQUE_MARGIN)
+        if allowed.scale == 0.0:
+            raise self._no_motion(motion, (), TORQUE_MARGIN)
+        played = self.play(allowed)
+        try:
+            played.sensitivities()
+        except ValueError:
+            states = [np.abs(x).max(axis=0) for x in (played.q - self._limits.home, played.dq)]
+            travel, speed = (", ".join(f"{x:.2g}" for x in values) for values in states)
+            raise OptionError(
+                f"the arm cannot be predicted along a motion within these limits, which moves the joints by {travel} at speeds up to {speed}",
+                remedy="widen position_min, position_max or speed in [limits]",
+            ) from None
+        return played
+
+    def _no_motion(self, motion: Motion, effects: Sequence[Any], part: float) -> OptionError:
+        """Return the error for a motion that no scale brings within the limits, with the joint whose torque does not suffice."""
+        limit = self._limits.torque
+        if limit is not None:
+            t = np.arange(0.0, motion.duration, self._setting.step * COARSE)
+            carried = np.abs(self._torques(motion.scaled(_LEAST_SCALE), effects, t)).max(axis=0)
+            j = int(np.argmax(carried / limit))
+            if carried[j] > _MOSTLY_CARRIED * part * limit[j]:
+                taken = f"friction, weight and effects alone take {carried[j]:.3g}"
+                return OptionError(
+                    f"torque_limit of joint {j + 1} is {limit[j]:.3g}, of which a motion may take {part:.0%}; {taken}",
+                    remedy="correct torque_limit, or choose limits near a pose that takes less",
+                )
+        return OptionError(
+            "no motion within the limits is free of collision and within the torques",
+            remedy="correct boxes, link_radius and torque_limit, or choose other limits",
+        )
 
     def play(self, motion: Motion) -> PredictedMotion:
         """Return a motion with the torques that it needs and the predictions of models along it."""
@@ -205,7 +259,12 @@ class Search:
 
     def _final(self, state: _State, tested: Sequence[TestedQuestion], threshold: float) -> Motion:
         """Return the best of the search's best motions, compared again by all sizes and windows and with the rival fully fitted."""
-        motions = [self.kept(motion, tested) for _, _, motion in state.best]
+        kept = [self.kept(motion, tested) for _, _, motion in state.best]
+        motions = [motion for motion in kept if motion.scale > 0.0]
+        if not motions:
+            effects = [p.pair.alternatives[-1][1][-1] for p in tested]
+            errors = [self._no_motion(state.best[0][2], (effect,), TORQUE_MOST) for effect in effects]
+            raise next((e for e in errors if "torque_limit of" in str(e)), errors[0])
         every = [[self.play(motion).outcome(p.pair) for p in tested] for motion in motions]
         sure = [sum(x.settled(threshold) for x in outcomes) / len(tested) for outcomes in every]
         order = [(s, _worth(outcomes, threshold)) for s, outcomes in zip(np.round(sure, 2), every, strict=True)]

@@ -7,6 +7,7 @@ from typing import Any
 
 from armgap import _native
 from armgap.literals import SERIAL
+from armgap.remainder import leaves_part
 from armgap.report.words import doubtful, named, percent, title
 
 __all__ = ["next_steps"]
@@ -15,8 +16,6 @@ Data = dict[str, Any]
 
 #: Largest number of unexcited effects that the next steps list; a section of the report lists all.
 LISTED = 3
-#: Share of the gap above the floor that remains with the causes, from which a next step mentions it: another motion changes the share by less.
-REMAINDER = 0.2
 _EXPORT = "`armgap export DIAGNOSIS.json --arm ARM.toml -o corrected.toml` (`.xml` for MuJoCo, `.urdf` for URDF)"
 _INTO_MODEL = "; `--model ROBOT.urdf -o corrected.urdf` writes them into your own description"
 _AGAIN = "After a repair, diagnose a log of the same motion and compare: `armgap compare DIAGNOSIS.json REPAIRED.json`."
@@ -73,9 +72,11 @@ def _effect(data: Data) -> list[str]:
     steps = [_alike(c) for c in data["causes"] if c.get("equivalents")]
     steps.append(f"Export the corrected model: {_export(data)}.")
     steps.append(_AGAIN)
-    left = 1.0 - float(data["gap"]["closed"])
-    if doubtful(data) or left > REMAINDER:
-        steps.append(f"{percent(left)} of the gap above the floor stays. {_LOG_MORE}")
+    if leaves_part(data):
+        left = float(data["gap"]["unexplained"])
+        steps.append(f"The causes leave {percent(left)} of the gap of the re-estimated arm file. {_LOG_MORE}")
+    elif doubtful(data):
+        steps.append(_LOG_MORE)
     return steps
 
 

@@ -76,7 +76,11 @@ def answers(c: Comparison) -> list[SummaryAnswer]:
 
 def _shrunk(c: Comparison) -> tuple[str, str]:
     gap = c.gap[0]
-    factor = "" if gap.factor is None else f" Above the sensors' floor it is {_times(gap.factor)}."
+    factor = "" if gap.factor is None else f" Above the noise floor it is {_times(gap.factor)}."
+    if c.outcome == "none":
+        factor = " Both are within what a perfect model would miss by."
+    elif gap.factor == 0.0:
+        factor = " What is left is within what a perfect model would miss by."
     return (
         each_joint(gap.before, gap.after, units=c.joint_units),
         f"RMS error of the arm file as it is, predicted over {c.horizon_s:g} s on held-out motion.{factor}",

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from armgap import _native
 from armgap._renamed import old_names
 from armgap.literals import SERIAL, joint_units
+from armgap.remainder import exceeds_floor, leaves_part
 from armgap.several_joints import place_text
 
 __all__ = [
@@ -285,7 +286,7 @@ def verdict(data: Data) -> str:
     """Return the verdict of a diagnosis as a sentence."""
     if data["verdict"] == "input":
         return _contradiction(data)
-    if doubtful(data):
+    if doubtful(data) or leaves_part(data):
         return "The arm does something that its model leaves out, and part of the gap stays unexplained."
     if none_allowed(data):
         return "There is a gap; no cause was allowed, so none is named."
@@ -472,13 +473,23 @@ def _how_far(data: Data) -> tuple[str, str]:
     elif data["verdict"] == "unexplained":
         headline, errors = "It stays", each_joint(after, units=units, joints=joints)
     else:
-        headline, errors = f"By {percent(gap['closed'])}", each_joint(before, after, units=units, joints=joints)
+        headline, errors = _share_closed(data), each_joint(before, after, units=units, joints=joints)
     detail = (
         f"{errors}: RMS error of predictions over {gap['horizon_s']:g} s on held-out motion"
         f"{', of the joints that the arm file misses most' if few else ''}. Re-estimating the arm file's own values alone "
-        f"leaves {millis(refit, units)}, sensor noise {millis(floor, units)}."
+        f"leaves {millis(refit, units)}; a perfect model would miss by {millis(floor, units)}, from noise and the measured starts."
     )
-    if data["verdict"] not in ("none", "input"):
-        low, high = gap["closed_ci"]
-        detail += f" 95\N{NO-BREAK SPACE}% interval of the share closed: {percent(low)} to {percent(high)}."
+    if data["verdict"] not in ("none", "input") and exceeds_floor(data, "before"):
+        low, high = (percent(max(share, -1.0)) for share in gap["closed_ci"])
+        below = "below " if gap["closed_ci"][0] < -1.0 else ""
+        detail += f" 95\N{NO-BREAK SPACE}% interval of the share closed: {below}{low} to {high}."
     return headline, detail
+
+
+def _share_closed(data: Data) -> str:
+    """Return the share of the gap that causes or re-estimated values close, as a headline; in words where there is none."""
+    if not exceeds_floor(data, "before"):
+        return "The held-out motion shows no gap to close"
+    if data["gap"]["closed"] < 0:
+        return f"{'The causes' if data.get('causes') else 'Other values'} do not shrink the gap of the held-out motion"
+    return f"By {percent(data['gap']['closed'])}"

@@ -19,7 +19,7 @@ from armgap.arm.serial.trust import FRICTION_SHARE, TRUSTS, Scales, Trust, link_
 from armgap.files.reading import printable
 from armgap.literals import SERIAL
 
-__all__ = ["SerialArmFile"]
+__all__ = ["DESCRIPTION_KEYS", "SerialArmFile"]
 
 Array = NDArray[np.float64]
 
@@ -38,7 +38,9 @@ _TABLES: dict[str, tuple[str, ...]] = {
     "corrections": (),
     "sealed": ("sha256",),
 }
-_SOURCES = ("urdf", "mjcf", "link")
+DESCRIPTION_KEYS = ("urdf", "mjcf")
+"""Keys of an arm file that name a robot's description, relative to the arm file."""
+_SOURCES = (*DESCRIPTION_KEYS, "link")
 _PLANAR = {
     "inertial": "write [[link]] tables, or name a description with urdf or mjcf",
     "links": "write [[link]] tables, or name a description with urdf or mjcf",

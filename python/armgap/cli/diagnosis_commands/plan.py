@@ -12,6 +12,7 @@ from armgap.cli.numbers import Number, Seed
 from armgap.cli.progress import working
 from armgap.errors import OptionError
 from armgap.files.output import is_stdout, write
+from armgap.options import LONGEST_PLAN_S, SHORTEST_PLAN_S
 
 __all__ = ["command"]
 
@@ -28,7 +29,11 @@ __all__ = ["command"]
     help="Effect to settle; may be repeated. Without it, the five open questions with the largest consequences.",
 )
 @click.option(
-    "--duration", type=Number(min=0, min_open=True), default=10.0, show_default=True, help="Length of the motion [s]."
+    "--duration",
+    type=Number(min=SHORTEST_PLAN_S, max=LONGEST_PLAN_S),
+    default=10.0,
+    show_default=True,
+    help="Length of the motion [s].",
 )
 @click.option("--seed", type=Seed(), default=1, show_default=True, help="Seed of the search.")
 @click.option(

@@ -18,7 +18,7 @@ from armgap.cli.common import (
     units_option,
 )
 from armgap.cli.files import Command, InputFile, OutputFile, Words
-from armgap.cli.numbers import Seed
+from armgap.cli.numbers import Number, Seed
 from armgap.cli.progress import working
 from armgap.errors import OptionError, ResultError
 from armgap.files.output import STANDARD_STREAM, is_stdout, write
@@ -64,6 +64,11 @@ SEED = "seed"
     help="Seed of the noise.",
 )
 @click.option(
+    "--tolerance",
+    type=Number(min=0, min_open=True),
+    help="Largest change of a position when steps are halved [rad or m]; 1e-9 per second by default.",
+)
+@click.option(
     "-o",
     "--output",
     type=OutputFile(),
@@ -81,6 +86,7 @@ def command(
     effect_texts: tuple[str, ...],
     noise: float,
     seed: int,
+    tolerance: float | None,
     output: str,
     columns: str | None,
     units: str | None,
@@ -122,7 +128,18 @@ def command(
         keep = source.t <= (duration if duration is not None else source.duration)
         t, tau, start, name = source.t[keep], source.tau[keep], _start(source), source.name
     with working("simulating", quiet=quiet):
-        log = simulate(arm, t, tau, q0=start[0], dq0=start[1], effects=effects, noise=noise, seed=seed, name=name)
+        log = simulate(
+            arm,
+            t,
+            tau,
+            q0=start[0],
+            dq0=start[1],
+            effects=effects,
+            noise=noise,
+            seed=seed,
+            tolerance=tolerance,
+            name=name,
+        )
     if output == STANDARD_STREAM:
         write(output, log.to_polars().write_csv())
     else:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -84,7 +84,13 @@ class HypothesisBuilder:
         self._floor = np.array(data["gap"]["floor"], dtype=np.float64)
 
     def pose(self, question: Question) -> TestedQuestion | None:
-        """Return a question with its models; None if the limits allow no value of the effect beyond those that the logs rule out."""
+        """Return a question with its models; None if the limits allow no value of the effect beyond those that the logs rule out.
+
+        Raises
+        ------
+        ValueError
+            If a model cannot be predicted along the usual motion.
+        """
         without = tuple(e for e in self._base if (e.effect, e.joint) != question.place)
         groups = self._alternatives(question, without)
         if not groups:
@@ -101,12 +107,16 @@ class HypothesisBuilder:
     def look_alikes(self, tested: TestedQuestion) -> list[Question]:
         """Return questions of an effect against effects that may imitate it, the most similar first.
 
-        The imitating effects act on the same joint or the whole arm, and the diagnosis tried them without finding them.
+        The imitating effects act on the same joint or the whole arm, and the diagnosis tried them without finding them. There are none where the
+        effect itself cannot be predicted along the usual motion.
         """
         effect, joint = tested.question.place
         middle = tested.pair.alternatives[len(tested.pair.alternatives) // 2]
         pair = HypothesisPair(((1.0, middle[1]),), tested.pair.rival)
-        target = self._usual.difference(pair)
+        try:
+            target = self._usual.difference(pair)
+        except ValueError:
+            return []
         whole, _ = self._usual.left_of(target)
         modelled = {(e.effect, e.joint) for e in tested.pair.rival}
         found = []
@@ -135,12 +145,20 @@ class HypothesisBuilder:
         known = shapes(*question.place, self._scales)
         if not known:
             values = levels(*question.place, self._scales)
-            return _even(EffectInstance(*question.place, v) for v in values)
+            return _even(self._instance(question.place, v) for v in values)
         return _even(
-            EffectInstance(*question.place, shape.at(size))
+            self._instance(question.place, shape.at(size))
             for shape in known
             for size in self._sizes(question, shape, without)
         )
+
+    def _instance(self, place: tuple[str, int | None], values: Mapping[str, float]) -> EffectInstance:
+        """Return an effect with values kept within the bounds of its parameters: small and slow motions suggest some beyond them."""
+        bounds = {spec["name"]: (spec["lower"], spec["upper"]) for spec in self._specs[place[0]]}
+        kept = {
+            name: min(max(v, bounds[name][0]), bounds[name][1]) if name in bounds else v for name, v in values.items()
+        }
+        return EffectInstance(*place, kept)
 
     def _estimated(self, question: Question) -> list[tuple[float, EffectInstance]]:
         """Return weighted effects at the quadrature nodes of the estimate's normal distribution."""
@@ -165,7 +183,7 @@ class HypothesisBuilder:
 
     def _sizes(self, question: Question, shape: Shape, without: tuple[EffectInstance, ...]) -> Array:
         """Return sizes of the effect from the smallest that matters, up to its bound if one is known."""
-        effect = EffectInstance(*question.place, shape.at(shape.typical))
+        effect = self._instance(question.place, shape.at(shape.typical))
         floors = self._usual.floors(HypothesisPair(((1.0, (*without, effect)),), without), 0, self._floor)
         matters = shape.typical * (SEVERAL / floors if floors > 0 else 1.0)
         matters = min(max(matters, shape.typical / 1e4), shape.typical * _TRIED_SIZE_RATIO)
@@ -196,7 +214,7 @@ class HypothesisBuilder:
         """Yield instances of an effect: per shape one of typical size and one of the size that best fits the target; its levels for a threshold."""
         spec = self._specs[place[0]][0]
         for shape in shapes(*place, self._scales):
-            typical = EffectInstance(*place, shape.at(shape.typical))
+            typical = self._instance(place, shape.at(shape.typical))
             yield typical
             try:
                 made = self._usual.difference(HypothesisPair(((1.0, (*without, typical)),), without))
@@ -208,9 +226,9 @@ class HypothesisBuilder:
                 continue
             values = shape.at(size)
             if spec["lower"] <= values[shape.main] <= spec["upper"]:
-                yield EffectInstance(*place, values)
+                yield self._instance(place, values)
         for level in levels(*place, self._scales) if not shapes(*place, self._scales) else ():
-            yield EffectInstance(*place, level)
+            yield self._instance(place, level)
 
     def _range(self, question: Question, effects: list[EffectInstance]) -> tuple[str, float, float] | None:
         name = self._specs[question.effect][0]["name"]

@@ -165,7 +165,7 @@ def _axes(ax: Axes | None) -> Axes:
 
 def _gap(data: Data, ax: Axes) -> Axes:
     gap = data["gap"]
-    shown = [*model_labels(data), ("sensor noise alone", "floor", charts.FLOOR)]
+    shown = [*model_labels(data), ("perfect model", "floor", charts.FLOOR)]
     width = 0.8 / len(shown)
     for i, (label, key, colour) in enumerate(shown):
         at = [j + (i - (len(shown) - 1) / 2) * width for j in range(len(gap[key]))]

@@ -27,7 +27,7 @@ def first_picture(data: Data) -> Section:
     unit = small_unit(data)
     joints = [f"joint {j + 1}" for j in range(len(gap["before"]))]
     series = [(label, [1e3 * v for v in gap[key]], colour) for label, key, colour in model_labels(data)]
-    series.append(("sensor noise alone", [1e3 * v for v in gap["floor"]], charts.FLOOR))
+    series.append(("perfect model", [1e3 * v for v in gap["floor"]], charts.FLOOR))
     caption = f"How far: RMS prediction error over {gap['horizon_s']:g} s [{unit}, log scale]"
     chart = charts.bars("", f"{unit}, log scale", joints, series, log=True, height=300)
     key = "before" if data["verdict"] == "parameters" else "refit"
@@ -39,7 +39,7 @@ def first_picture(data: Data) -> Section:
 def _bars(data: Data) -> Table:
     """Return the chart of the gap as a table with bars of text, longest for the largest error."""
     gap = data["gap"]
-    shown = [*((label, key) for label, key, _ in model_labels(data)), ("sensor noise alone", "floor")]
+    shown = [*((label, key) for label, key, _ in model_labels(data)), ("perfect model", "floor")]
     top = max((v for _, key in shown for v in gap[key]), default=0.0) or 1.0
     rows: list[tuple[Cell, ...]] = [
         (f"joint {j + 1}", label, Bar(gap[key][j] / top, error_text(1e3 * gap[key][j]), charts.BEFORE))
