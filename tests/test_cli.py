@@ -188,3 +188,8 @@ def test_an_interrupt_ends_cleanly(arm_file, tmp_path):
     # click ends the line on which the terminal shows ^C.
     assert (out_text, err) == (b"", b"\narmgap: interrupted\n")
     assert [p.name for p in tmp_path.iterdir()] == []
+
+
+def test_the_module_is_the_command() -> None:
+    ran = subprocess.run([sys.executable, "-m", "armgap", "--version"], capture_output=True, text=True, check=True)
+    assert ran.stdout == f"armgap, version {__version__}\n"

@@ -26,7 +26,7 @@ ORDER = (
         "remainder",
     ),
     *("log", "arm", "simulation", "check", "estimation", "evidence", "diagnosis", "export", "report"),
-    *("inspection", "planning", "fleet", "reproduction", "trial", "cli", "own"),
+    *("inspection", "planning", "fleet", "reproduction", "trial", "cli", "own", "__main__"),
 )
 #: What shows itself in a notebook or as text, by reports; and an entry point, which is a command.
 ALLOWED = {
