@@ -78,10 +78,10 @@ pub(crate) fn assemble<const N: usize, const P: usize>(
     }
     let reported = if contradicted { &found.refit_feasible } else { &found.reported };
     if contradicted {
-        models[2] = models[1].clone();
-        predicted[2] = predicted[1].clone();
+        let (model, prediction) = (models[1].clone(), predicted[1].clone());
+        (models[2], predicted[2]) = (model, prediction);
     }
-    let compared = Compared { predicted, measured, floor, models };
+    let compared = Compared { models, predicted, measured, floor };
     let gap = gap(&compared, data, &rotary, options);
     let evidence = Evidence {
         named: !named.is_empty(),
