@@ -65,6 +65,13 @@ def test_a_stretch_without_torque_is_left_out_by_the_remedy(quiet: list[Log], ar
     assert find([left, *quiet[1:]], arm)[1] == []
 
 
+def test_every_stretch_of_a_log_is_judged(quiet: list[Log], arm: Arm) -> None:
+    rows = round(0.8 / PERIOD)
+    twice = without_torque(without_torque(quiet[0], 1, 0, rows), 1, -rows - 100, -100)
+    corrections, checks = find([twice, *quiet[1:]], arm)
+    assert (len(checks), len(corrections.skip)) == (2, 2)
+
+
 @pytest.mark.parametrize("joint", [1, 2])
 def test_a_torque_that_no_log_holds_is_no_cause(joint: int, quiet: list[Log], arm: Arm) -> None:
     given = [without_torque(log, joint) for log in quiet]

@@ -46,20 +46,23 @@ def find(logs: Sequence[Log], arm: Arm) -> tuple[Corrections, list[Check]]:
     runs = [_runs(log) for log in logs]
     if not any(runs):
         return Corrections(), []
-    rows = [_around(log, arm, of_log, MOST_INTERVALS // len(logs)) for log, of_log in zip(logs, runs, strict=True)]
-    known = [found for found in rows if found is not None]
+    most = MOST_INTERVALS // len(logs)
+    pairs = [
+        (LogRows.of(log, arm, *_undisturbed(log, of_log, most)), of_log) for log, of_log in zip(logs, runs, strict=True)
+    ]
+    known = [rows for rows, _ in pairs if rows is not None]
     if not known:
         return Corrections(), []
-    alive = [_alive(r, of_log) for r, of_log in zip(rows, runs, strict=True) if r is not None]
+    alive = [_alive(rows, of_log) for rows, of_log in pairs if rows is not None]
     reference = Rows.of_rows(known, alive)
     theta = arm.theta if reference is None else reference.fit(arm, np.ones(arm.n_joints)).theta
     outside = _mean_squares([r.y - r.psi @ theta for r in known], alive)
     checks: list[Check] = []
-    for log, of_log, found in zip(logs, runs, rows, strict=True):
-        if found is not None:
-            said = [check for run in of_log if (check := _judged(log, run, found, theta, outside))]
-            spans = [check for check in said if _skipped(check)]
-            checks += [*merged(spans), *(check for check in said if check not in spans)]
+    for log, of_log in zip(logs, runs, strict=True):
+        within = {run: LogRows.of(log, arm, run[1], min(run[2], run[1] + most) + 1) for run in of_log}
+        said = [check for run, rows in within.items() if rows and (check := _judged(log, run, rows, theta, outside))]
+        spans = [check for check in said if _skipped(check)]
+        checks += [*merged(spans), *(check for check in said if check not in spans)]
     skip = tuple(span for check in checks for span in _skipped(check))
     return Corrections(skip=skip), [check for check in checks if not _said_before(check, checks)]
 
@@ -89,13 +92,18 @@ def _runs(log: Log) -> list[Run]:
     return [*constant_torques(log), *((int(j), 0, len(log) - 1) for j in constant)]
 
 
-def _around(log: Log, arm: Arm, runs: Sequence[Run], most: int) -> LogRows | None:
-    """Return rows from the middle `most` intervals of a log, moved to hold the first run of constant torque that is not the whole log."""
-    count = min(len(log), most + 1)
-    partial = [run for run in runs if (run[1], run[2]) != (0, len(log) - 1)]
-    centre = (partial[0][1] + min(partial[0][2], partial[0][1] + most // 2)) // 2 if partial else len(log) // 2
-    begin = min(max(centre - count // 2, 0), len(log) - count)
-    return LogRows.of(log, arm, begin, begin + count)
+def _undisturbed(log: Log, runs: Sequence[Run], most: int) -> tuple[int, int]:
+    """Return the samples, first and end, of at most `most` intervals in the middle of the longest part of a log between runs of constant torque."""
+    edges = [0]
+    for _, first, last in sorted(
+        (run for run in runs if (run[1], run[2]) != (0, len(log) - 1)), key=lambda run: run[1]
+    ):
+        edges += [first, max(last, edges[-1])]
+    edges.append(len(log))
+    begin, end = max(zip(edges[::2], edges[1::2], strict=True), key=lambda part: part[1] - part[0])
+    count = min(end - begin, most + 1)
+    begin += (end - begin - count) // 2
+    return begin, begin + count
 
 
 def _alive(rows: LogRows, runs: Sequence[Run]) -> NDArray[np.bool_]:
@@ -111,7 +119,7 @@ def _judged(
 ) -> Check | None:
     """Return a check of a run in which the equation of motion lacks much more torque than outside of it; None otherwise."""
     j, first, last = run
-    inside = (rows.first >= first) & (rows.last <= last)
+    inside = np.ones(len(rows.y), dtype=bool)
     whole = (first, last) == (0, len(log) - 1)
     if whole:
         # Friction holds a joint at rest with any torque, so that only rows count in which the joint moves one way.
