@@ -10,9 +10,11 @@ __all__ = [
     "__version__",
     "arm_kinds",
     "bench",
+    "bounded_least_squares",
     "diagnose",
     "diagnosis_schema",
     "effects",
+    "filtered_torques",
     "fit",
     "inertia",
     "refit",
@@ -78,6 +80,10 @@ def regression_rows(
     tau: NDArray[np.float64],
     cutoff: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+def filtered_torques(t: NDArray[np.float64], tau: NDArray[np.float64], cutoff: float) -> NDArray[np.float64]: ...
+def bounded_least_squares(
+    gram: NDArray[np.float64], right: NDArray[np.float64], low: NDArray[np.float64], high: NDArray[np.float64]
+) -> NDArray[np.float64]: ...
 def fit(
     arm: dict[str, Any],
     t: NDArray[np.float64],

@@ -260,7 +260,8 @@ def _fit(
         return delivered(read, arm, low, high, stands=base, rows=rows)
     if reading.corrections.gravity is not None:
         return as_commanded(base, low, high)
-    return as_commanded(EquationError([Rows.of(log, arm) for log in read], arm, base.scale), low, high)
+    rows = [there.read_as(log, arm) for there, log in zip(base.rows, read, strict=True)]
+    return as_commanded(EquationError(rows, arm, base.scale), low, high)
 
 
 def confirm(

@@ -105,7 +105,7 @@ def _judged(log: Log, rows: Rows, arm: Arm, runs: list[Run], near: list[Run]) ->
         alive &= (when < log.t[first]) | (when > log.t[last] + _FORGOTTEN_S)
     if alive.sum() < _MIN_STRETCH_ROWS:
         return []
-    known = Rows(rows.psi[alive], rows.y[alive], rows.samples[alive])
+    known = rows.at(alive)
     base = EquationError([known], arm)
     residual = rows.y - rows.psi @ base.fit(*bounds(arm)).theta
     checks = []

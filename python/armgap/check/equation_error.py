@@ -32,8 +32,6 @@ CUTOFF = 30.0
 _SPEED_S, _SPEED_SAMPLES, _STANDSTILL, _REMEMBERED = 0.01, 3, 0.05, 0.05
 # Rows that parameters are estimated from, at least.
 FEWEST_ROWS = 100
-# Native description of an axis, as a filter of torques.
-_AXIS = {"kind": "axis", "gravity": 0.0, "theta": [1.0, 0.0, 0.0, 0.0], "sigma": [1.0] * 4}
 # Largest cut-off of the filters, in parts of the sample rate; it bounds the cut-off for slowly sampled logs.
 _LARGEST_CUTOFF = 0.5
 # Time constants of the filters that pass before a row is used, after the start and after a hole in the samples.
@@ -50,11 +48,6 @@ _BESIDE_S = 8.0
 _EXPLAINED_RESIDUAL_SHARE = 0.02
 # Share of a joint's torque below which a residual counts as zero.
 _ZERO_RESIDUAL_SHARE = 1e-5
-# Decrease of the cost, as a part of the largest moment, from which the active set method leaves a bound.
-_SETTLED = 1e-9
-# Rounds of the active set method per parameter at most, and the regularisation that keeps columns without excitation solvable.
-_MOST_ROUNDS = 6
-_RIDGE = 1e-10
 
 
 @dataclass(frozen=True)
@@ -69,11 +62,14 @@ class Rows:
         Filtered torques [N m or N].
     samples : ndarray, shape (n_rows,)
         Sample index in the log of each row.
+    cutoff : float
+        Cut-off of the filters [rad/s].
     """
 
     psi: Array
     y: Array
     samples: NDArray[np.intp]
+    cutoff: float
 
     @classmethod
     def of(cls, log: Log, arm: Arm, cutoff: float = CUTOFF, around: tuple[int, int] | None = None) -> Rows:
@@ -90,9 +86,17 @@ class Rows:
         settled = _settled(t, _HOLE_PERIODS * period, _SETTLING / cutoff)
         settled &= np.isfinite(y).all(axis=1)
         rows = np.flatnonzero(settled)
-        return cls(psi[rows], y[rows], rows + part.start)
+        return cls(_taken(psi, rows), _taken(y, rows), rows + part.start, cutoff)
 
-    def moving(self, log: Log, cutoff: float = CUTOFF) -> Mask:
+    def read_as(self, log: Log, arm: Arm) -> Rows:
+        """Return the rows of another reading `log` of the log that these rows belong to, with the same times, at the same samples."""
+        part = _part(log, None)
+        t, q, tau = (np.ascontiguousarray(x[part]) for x in (log.t, log.q, log.tau))
+        psi, y = _native.regression_rows(arm.to_native(), t, q, tau, self.cutoff)
+        rows = self.samples - part.start
+        return replace(self, psi=_taken(psi, rows), y=_taken(y, rows))
+
+    def moving(self, log: Log) -> Mask:
         """Return a mask of the rows of a log and the joints that have been moving for as long as the filters remember, shape (n_rows, n_joints).
 
         The friction of a joint at rest is any torque up to its break-away torque and not that of the equation of motion. Rows that remember a
@@ -106,24 +110,32 @@ class Rows:
         width = max(_SPEED_SAMPLES, round(_SPEED_S / period)) | 1
         speed = np.abs(np.gradient(_running_mean(q, width), t, axis=0))
         slow = speed < _STANDSTILL * np.sqrt(np.mean(speed**2, axis=0))
-        memory = _low_passed(slow.astype(float), math.exp(-cutoff * period))
+        memory = _low_passed(slow.astype(float), math.exp(-self.cutoff * period))
         moving: Mask = memory[self.samples - first] < _REMEMBERED
         return moving
+
+    def at(self, part: slice | Mask) -> Rows:
+        """Return a part of the rows, by a slice or a mask."""
+        return replace(self, psi=self.psi[part], y=self.y[part], samples=self.samples[part])
 
     def within(self, mask: Mask) -> Rows:
         """Return the rows with those of joints outside of a mask (`moving`) as zeros, which count for nothing."""
         return replace(self, psi=self.psi * mask[:, :, None], y=self.y * mask)
 
     def with_torque(self, log: Log, joint: int, torque: Array) -> Rows:
-        """Return the rows of a log (`Rows.of`, default cut-off) with other torques of one joint (from 0), given at all samples [N m or N]."""
+        """Return the rows of a log (`Rows.of`) with other torques of one joint (from 0), given at all samples [N m or N]."""
         part = _part(log, None)
         t, tau = (np.ascontiguousarray(x[part]) for x in (log.t, torque))
-        cutoff = min(CUTOFF, _LARGEST_CUTOFF / float(np.median(np.diff(t))))
-        # The right sides of the rows of any arm are filtered torques; an axis has the cheapest left sides.
-        _, filtered = _native.regression_rows(_AXIS, t, np.zeros((len(t), 1)), tau[:, None], cutoff)
         y = self.y.copy()
-        y[:, joint] = filtered[self.samples - part.start, 0]
+        y[:, joint] = _taken(_native.filtered_torques(t, tau, self.cutoff), self.samples - part.start)
         return replace(self, y=y)
+
+
+def _taken(x: Array, rows: NDArray[np.intp]) -> Array:
+    """Return some rows of an array, ascending; a view where they follow each other without a hole."""
+    if len(rows) and rows[-1] - rows[0] == len(rows) - 1:
+        return x[rows[0] : rows[-1] + 1]
+    return x[rows]
 
 
 def _low_passed(x: Array, forget: float) -> Array:
@@ -195,7 +207,7 @@ class EquationError:
         self.arm = arm
         self.rows = tuple(rows)
         self.count = sum(len(r.y) for r in rows)
-        self.gram = sum(np.einsum("kji,kjl->jil", r.psi, r.psi, optimize=True) for r in rows) / max(self.count, 1)
+        self.gram = sum((_by_joint(r.psi, r.psi) for r in rows), 0.0) / max(self.count, 1)
         self.moment, self.square = self._moments([r.y for r in rows])
         self.terms = self._terms() if terms is None else terms
         self.scale: Array = np.maximum(np.maximum(self.square, self.terms), 1e-30) if scale is None else scale
@@ -203,7 +215,7 @@ class EquationError:
     def _moments(self, torques: Sequence[Array]) -> tuple[Array, Array]:
         """Return per joint the products of the regressor with the torques, and the mean squares of the torques."""
         pairs = list(zip(self.rows, torques, strict=True))
-        moment = sum(np.einsum("kji,kj->ji", r.psi, y) for r, y in pairs) / max(self.count, 1)
+        moment = sum((_by_joint(r.psi, y) for r, y in pairs), 0.0) / max(self.count, 1)
         square = sum(np.sum(y**2, axis=0) for y in torques) / max(self.count, 1)
         return np.asarray(moment), np.asarray(square)
 
@@ -231,12 +243,7 @@ class EquationError:
 
     def _solve(self, low: Array, high: Array, moment: Array, square: Array, scale: Array) -> Fit:
         gram = np.einsum("jil,j->il", self.gram, 1.0 / scale)
-        size = np.sqrt(np.diag(gram))
-        size[size == 0] = 1.0
-        theta = (
-            _bounded(gram / np.outer(size, size), (moment / scale[:, None]).sum(axis=0) / size, low * size, high * size)
-            / size
-        )
+        theta = _native.bounded_least_squares(gram, (moment / scale[:, None]).sum(axis=0), low, high)
         left = square - 2.0 * moment @ theta + np.einsum("i,jil,l->j", theta, self.gram, theta)
         return Fit(theta, np.maximum(left, 0.0) / scale)
 
@@ -293,40 +300,6 @@ def bounds(arm: Arm, factor: float = _TRUST_FACTOR) -> tuple[Array, Array]:
     return low, high
 
 
-def _bounded(gram: Array, moment: Array, low: Array, high: Array) -> Array:
-    """Minimise ``x' gram x / 2 - moment' x`` between bounds by active sets (Stark and Parker 1995); `gram` has a diagonal of one or zero.
-
-    The first active set is that of the minimum without bounds.
-    """
-    gram = gram + _RIDGE * np.eye(len(moment))
-    x: Array = np.clip(np.linalg.solve(gram, moment), low, high)
-    free = (x > low) & (x < high)
-    for _ in range(_MOST_ROUNDS * len(moment)):
-        target = x.copy()
-        rows = gram[free]
-        target[free] = np.linalg.solve(rows[:, free], moment[free] - rows[:, ~free] @ x[~free])
-        step, blocked = _step_within(x, target, low, high, free)
-        x = x + step * (target - x)
-        if blocked is not None:
-            x[blocked] = low[blocked] if target[blocked] < low[blocked] else high[blocked]
-            free[blocked] = False
-            continue
-        slope = gram @ x - moment
-        # A bound is left where the cost falls towards the inside.
-        inward = np.where(free, 0.0, np.where(x <= low, -slope, slope))
-        best = int(np.argmax(inward))
-        if inward[best] <= _SETTLED * max(float(np.abs(moment).max()), 1e-30):
-            break
-        free[best] = True
-    return x
-
-
-def _step_within(x: Array, target: Array, low: Array, high: Array, free: NDArray[np.bool_]) -> tuple[float, int | None]:
-    """Return the largest step towards `target` within the bounds, as a part up to 1, and the index of the bound that stops the step."""
-    step, blocked = 1.0, None
-    for i in np.flatnonzero(free & ((target < low) | (target > high))):
-        bound = low[i] if target[i] < low[i] else high[i]
-        part = (bound - x[i]) / (target[i] - x[i])
-        if part < step:
-            step, blocked = max(part, 0.0), int(i)
-    return step, blocked
+def _by_joint(psi: Array, x: Array) -> Array:
+    """Return per joint the product of the transposed regressor with `x`, shape (n_rows, n_joints) or (n_rows, n_joints, n_columns)."""
+    return np.stack([psi[:, j].T @ x[:, j] for j in range(psi.shape[1])])

@@ -93,10 +93,10 @@ def _halves(log: Log, arm: Arm) -> list[tuple[Rows, Mask]]:
     rows = Rows.of(log, arm, _SHIFT_CUTOFF)
     if len(rows.y) < 2 * _MIN_HALF_LOG_ROWS:
         return []
-    moving = rows.moving(log, _SHIFT_CUTOFF)
+    moving = rows.moving(log)
     middle = len(rows.y) // 2
     parts = [slice(0, middle), slice(middle, None)]
-    halves = [(Rows(rows.psi[part], rows.y[part], rows.samples[part]), moving[part]) for part in parts]
+    halves = [(rows.at(part), moving[part]) for part in parts]
     enough = [(half, mask & (mask.sum(axis=0) >= _MIN_HALF_LOG_ROWS)) for half, mask in halves]
     return [(half, mask) for half, mask in enough if mask.any()]
 
@@ -113,7 +113,7 @@ def _curve(rows: Rows, moving: Mask, arm: Arm) -> NDArray[np.float64]:
     unbroken = rows.samples[reach:] - rows.samples[:-reach] == reach
     counts = moving[inner] & unbroken[:, None]
     weight = counts.sum(axis=0)
-    base = EquationError([Rows(rows.psi[inner], rows.y[inner], rows.samples[inner]).within(counts)], arm)
+    base = EquationError([rows.at(inner).within(counts)], arm)
     shifted = [
         rows.y[_MAX_SHIFT_SAMPLES - s : count - _MAX_SHIFT_SAMPLES - s] * counts
         for s in range(-_MAX_SHIFT_SAMPLES, _MAX_SHIFT_SAMPLES + 1)

@@ -27,7 +27,7 @@ mod _native {
     #[pymodule_export]
     use crate::fit::fit;
     #[pymodule_export]
-    use crate::regression::{regression_rows, velocity};
+    use crate::regression::{bounded_least_squares, filtered_torques, regression_rows, velocity};
     #[pymodule_export]
     use crate::simulate::{inertia, simulate};
 

@@ -1,8 +1,9 @@
-//! Python functions `regression_rows` and `velocity`.
+//! Python functions `regression_rows`, `filtered_torques`, `bounded_least_squares` and `velocity`.
 
 use crate::convert::{description, matrix, vector};
-use armgap_fit::identify::regression_rows::RegressionRows;
+use armgap_fit::identify::regression_rows::{RegressionRows, filtered_torques as filtered};
 use armgap_fit::log::velocity::Velocity;
+use armgap_fit::numeric::bounded;
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -32,6 +33,40 @@ pub fn regression_rows<'py>(
         .detach(|| arm.dispatch(work))
         .ok_or_else(|| PyValueError::new_err("`theta` has the wrong length for this arm"))?;
     Ok((PyArray1::from_vec(py, rows.psi).reshape([t.len(), n, p])?, table(py, rows.y, t.len(), n)?))
+}
+
+/// Right sides of the rows of the filtered dynamic model for the torques of one joint, one per sample; NaN at the first two samples.
+#[pyfunction]
+pub fn filtered_torques<'py>(
+    py: Python<'py>,
+    t: PyReadonlyArray1<'py, f64>,
+    tau: PyReadonlyArray1<'py, f64>,
+    cutoff: f64,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let (t, tau) = (vector(&t, "t")?, vector(&tau, "tau")?);
+    if t.len() != tau.len() {
+        return Err(PyValueError::new_err("`tau` has to be as long as `t`"));
+    }
+    Ok(PyArray1::from_vec(py, filtered(t, tau, cutoff)))
+}
+
+/// Minimum of `x' gram x / 2 - right' x` between bounds, by active sets; NaN where there is no finite solution.
+#[pyfunction]
+pub fn bounded_least_squares<'py>(
+    py: Python<'py>,
+    gram: PyReadonlyArray2<'py, f64>,
+    right: PyReadonlyArray1<'py, f64>,
+    low: PyReadonlyArray1<'py, f64>,
+    high: PyReadonlyArray1<'py, f64>,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let right = vector(&right, "right")?;
+    let n = right.len();
+    let (low, high) = (vector(&low, "low")?, vector(&high, "high")?);
+    if low.len() != n || high.len() != n {
+        return Err(PyValueError::new_err("`low` and `high` have to be as long as `right`"));
+    }
+    let x = bounded::bounded_least_squares(matrix(&gram, "gram", n, n)?, right, low, high);
+    Ok(PyArray1::from_vec(py, x.unwrap_or_else(|| vec![f64::NAN; n])))
 }
 
 /// Joint velocities from positions by the named method: backward, central or local-cubic.

@@ -6,7 +6,7 @@
 use crate::model::arm::WithArm;
 use armgap_core::arm::Arm;
 use armgap_core::cpu::Portable;
-use armgap_core::filter::Cutoff;
+use armgap_core::filter::{CachedCoefficients, Cutoff};
 use armgap_core::regression::{AllColumns, FilteredDynamic, SampleInterval, Snapshot, Variant};
 use nalgebra::SVector;
 
@@ -72,6 +72,25 @@ impl WithArm for RegressionRows<'_> {
     }
 }
 
+/// Filtered torques of one joint, N m or N: `y` of [`Rows`] for torques `tau` held from each sample to the next, without the regressor.
+///
+/// `t` are the sample times [s], `cutoff` is in rad/s; NaN at the first two samples.
+pub fn filtered_torques(t: &[f64], tau: &[f64], cutoff: f64) -> Vec<f64> {
+    let samples = t.len().min(tau.len());
+    let mut y = vec![f64::NAN; samples.min(2)];
+    y.reserve(samples);
+    let coefficients = CachedCoefficients::new(&Cutoff { rad_per_s: cutoff });
+    let (mut before, mut after) = (coefficients, coefficients);
+    let mut torque = 0.0;
+    for k in 2..samples {
+        let half = [(t[k - 1] - t[k - 2]) * 0.5, (t[k] - t[k - 1]) * 0.5];
+        torque = before.step(half[0]).held::<Portable>(torque, tau[k - 2]);
+        torque = after.step(half[1]).held::<Portable>(torque, tau[k - 1]);
+        y.push(torque);
+    }
+    y
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -104,6 +123,10 @@ mod tests {
             (sum - rows.y[k]).abs()
         });
         assert!(rows.y[0].is_nan() && rows.y[1].is_nan());
+        let alone = filtered_torques(&t, &tau, 30.0);
+        assert!(
+            alone[1].is_nan() && alone.iter().zip(&rows.y).skip(2).all(|(a, b)| (a - b).abs() < 1e-12 * f)
+        );
         assert!(worst.fold(0.0, f64::max) < 1e-5 * f);
     }
 }

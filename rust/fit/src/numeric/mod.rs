@@ -1,11 +1,13 @@
 //! Numerical methods that are independent of arms.
 //!
+//! * `bounded`: linear least squares between bounds.
 //! * `low_pass`: Gaussian low-pass from uneven samples onto a regular grid.
 //! * `minimum`: minimum of a function of one variable.
 //! * `products`: inner products of long columns, RMS differences by joint.
 //! * `random`: pseudo-random numbers that are reproducible on every machine.
 //! * `smooth`: local cubic least squares with uneven sample times.
 
+pub mod bounded;
 pub(crate) mod low_pass;
 pub(crate) mod minimum;
 pub(crate) mod products;
