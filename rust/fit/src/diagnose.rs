@@ -13,13 +13,14 @@ use crate::predict::window::Dataset;
 use crate::progress::{Observer, Phase, ProgressReporter, guarded};
 use crate::result::report::Diagnosis;
 use crate::result::sanity::bounded_sigma;
+use crate::result::training_gap::TrainingGap;
 use crate::search::crosswise::{crosswise, explains};
 use armgap_core::arm::Arm;
 use std::time::Instant;
 
 /// Note in the result of a diagnosis by interleaved cross-validation.
-const CROSSWISE: &str = "effects fitted to the training logs did not explain the holdout: every log was cut into stretches that were learnt \
-     from and judged on by turns";
+const CROSSWISE: &str = "training and holdout logs show different gaps: every log was cut into stretches that were learnt from and judged on \
+     by turns";
 
 /// Probability, 0 to 1, from which an external disturbance counts as named.
 const NAMED_DISTURBANCE: f64 = 0.5;
@@ -59,16 +60,19 @@ impl WithArm for Request<'_> {
         let mut context = self.context::<A, N, P>(arm.clone(), theta, self.training, self.holdout)?;
         let Options { max_causes, seed, .. } = *self.options;
         let mut conclusion = context.conclude(context.attribute(max_causes, seed, None), max_causes, seed);
-        let instead = self.crosswise(arm, theta, &context, &conclusion)?;
+        let mut in_training = training_gap(&context, &conclusion, seed);
+        let instead = self.crosswise(arm, theta, &context, &conclusion, in_training.is_some())?;
         let is_crosswise = instead.is_some();
         if let Some(instead) = instead {
             (context, conclusion) = instead;
+            in_training = None;
         }
         let headline = context.headline(conclusion, max_causes);
         let attribution = &headline.attribution;
         let open = context.open_candidates(&attribution.model.hypothesis).len();
         context.progress.begin(Phase::Result, open + attribution.nodes[0].field.len());
-        let mut diagnosis = crate::result::assemble::assemble(&context, &headline, self.arm, self.options);
+        let mut diagnosis =
+            crate::result::assemble::assemble(&context, &headline, in_training, self.arm, self.options);
         if is_crosswise {
             diagnosis.notes.insert(0, CROSSWISE.to_owned());
         }
@@ -77,20 +81,34 @@ impl WithArm for Request<'_> {
     }
 }
 
+/// Gap on the training logs that a diagnosis without a cause and without a gap on the holdout leaves.
+fn training_gap<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    context: &DiagnosisContext<A, N, P>,
+    first: &Conclusion<N, P>,
+    seed: u64,
+) -> Option<TrainingGap> {
+    let found = &first.attribution;
+    let is_silent = found.causes.is_empty() && first.disturbances.is_empty() && !found.is_unexplained();
+    let last = found.nodes.last().filter(|_| is_silent)?;
+    TrainingGap::of(context, &found.model.hypothesis, &last.weights.training.zeros, seed)
+}
+
 impl Request<'_> {
-    /// The diagnosis by interleaved cross-validation, where it explains what the diagnosis `first` left open or took for external disturbances.
+    /// The diagnosis by interleaved cross-validation, where it explains what the diagnosis `first` left open or took for external disturbances, or
+    /// what only the training logs show (`in_training`).
     fn crosswise<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         &self,
         arm: A,
         theta: [f64; P],
         plain: &DiagnosisContext<A, N, P>,
         first: &Conclusion<N, P>,
+        in_training: bool,
     ) -> Result<Option<(DiagnosisContext<A, N, P>, Conclusion<N, P>)>, DiagnoseError> {
         let Options { max_causes, seed, horizon, .. } = *self.options;
         let pushed = first.disturbances.iter().any(|e| e.probability > NAMED_DISTURBANCE);
-        if !(first.attribution.is_unexplained() || pushed)
-            || !plain.holdout_shows_more(first.without_disturbances())
-        {
+        let open = first.attribution.is_unexplained() || pushed;
+        let differ = in_training || (open && plain.holdout_shows_more(first.without_disturbances()));
+        if !differ {
             return Ok(None);
         }
         let Some([training, holdout]) = crosswise(self.training, self.holdout, horizon) else {

@@ -21,6 +21,7 @@ use crate::result::report::{
 };
 use crate::result::ruled_out::ruled_out;
 use crate::result::sanity::{Estimate, Sanity, bounded_sigma, sanity};
+use crate::result::training_gap::TrainingGap;
 use crate::result::verdict::{Evidence, Verdict};
 use crate::search::attribute::Candidate;
 use crate::search::belief::left_over;
@@ -38,6 +39,7 @@ const ZEROS_MATTER: f64 = 0.1;
 pub fn assemble<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     context: &DiagnosisContext<A, N, P>,
     headline: &Headline<N, P>,
+    in_training: Option<TrainingGap>,
     description: &ArmDescription,
     options: &Options,
 ) -> Diagnosis {
@@ -61,12 +63,18 @@ pub fn assemble<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         let regimes = regimes(&residuals, rotary);
         (residuals, regimes)
     };
-    let candidates = || (ruled_out(context, attribution, rotary), ranking(context, attribution, rotary));
+    let candidates = || {
+        (
+            ruled_out(context, attribution, in_training.is_some(), rotary),
+            ranking(context, attribution, rotary),
+        )
+    };
     let ((absent, ranking), ((gap, beside_zeros, series, free_run_series), (residuals, regimes))) =
         rayon::join(candidates, || rayon::join(figures, residual));
     let evidence = Evidence {
         named: !headline.causes.is_empty() || !disturbances.is_empty(),
         open: headline.open,
+        in_training: in_training.is_some(),
         before: &gap.before,
         refit: &gap.refit,
         after: &beside_zeros,
@@ -77,7 +85,8 @@ pub fn assemble<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     let laws =
         if remains { context.laws_beside(&headline.model, &headline.weights, rotary) } else { Vec::new() };
     let sanity = sanity(description.kind, &estimates(&headline.model, description), remains);
-    let notes = notes(headline, options.max_causes, remains, &sanity, &gap, description);
+    let mut notes = notes(headline, options.max_causes, remains, &sanity, &gap, description);
+    notes.extend(in_training.map(|found| found.remark(gap.unit)));
     Diagnosis {
         schema: "armgap.diagnosis/1",
         verdict,

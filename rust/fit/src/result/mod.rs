@@ -7,6 +7,7 @@
 //! * `report`: types of the result (`armgap.diagnosis/1`), which are its JSON Schema.
 //! * `ruled_out`: status of every effect that was looked for and not found.
 //! * `sanity`: checks of re-estimated parameters against what the arm file allows.
+//! * `training_gap`: gap that only the training logs show.
 //! * `verdict`: the verdict of a diagnosis, as a function of prediction errors.
 
 pub mod assemble;
@@ -16,4 +17,5 @@ pub(crate) mod headline;
 pub mod report;
 pub(crate) mod ruled_out;
 pub(crate) mod sanity;
+pub(crate) mod training_gap;
 pub mod verdict;

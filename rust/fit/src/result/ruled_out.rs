@@ -19,10 +19,12 @@ const COULD_BE: f64 = 0.1;
 /// Why an effect is undecided that the training logs show and the holdout does not.
 const TRACED: &str = "it leaves a trace in the training logs, but does not reduce the gap on the holdout";
 
-/// Status of every candidate effect that is no cause, from its score test (first-order) around the final model.
+/// Status of every candidate effect that is no cause, from its score test (first-order) around the final model; `in_training`: whether the training
+/// logs show a gap that the holdout does not.
 pub fn ruled_out<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     context: &DiagnosisContext<A, N, P>,
     attribution: &Attribution<N, P>,
+    in_training: bool,
     rotary: bool,
 ) -> Vec<RuledOut> {
     let node = &attribution.nodes[attribution.nodes.len() - 1];
@@ -34,7 +36,7 @@ pub fn ruled_out<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     let known = node.screened.get(..open.len()).filter(|_| unchanged);
     let scored = known.map_or_else(|| screen(&problem, model, &open), <[ScoreTest]>::to_vec);
     let remains = problem.weighting.total(&problem.raw_costs(model));
-    let unexplained = node.is_open();
+    let unexplained = node.is_open() || in_training;
     let mut list: Vec<(EffectInstance, RuledOut)> = Vec::new();
     for test in &scored {
         let mut entry = status(context, test, rotary);

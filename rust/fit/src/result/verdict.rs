@@ -36,6 +36,8 @@ pub struct Evidence<'a> {
     pub named: bool,
     /// Whether the model search ended with a cost above what noise explains.
     pub open: bool,
+    /// Whether the training logs show a gap that the holdout does not (`training_gap`).
+    pub in_training: bool,
     /// RMS position error by joint of the arm file as it is, rad or m.
     pub before: &'a [f64],
     /// RMS position error by joint with parameters re-estimated, rad or m.
@@ -51,16 +53,11 @@ pub struct Evidence<'a> {
 impl Evidence<'_> {
     /// Whether the reported model leaves a gap of consequence that is more than noise.
     pub fn remains(&self) -> bool {
-        self.open || self.stands_out(self.after)
+        self.open || self.in_training || self.stands_out(self.after)
     }
 
-    /// Whether the `error` of some joint, rad or m, is several noise floors and of consequence in relation to the joint's motion.
     fn stands_out(&self, error: &[f64]) -> bool {
-        let limits = self.floor.iter().zip(self.motion);
-        error
-            .iter()
-            .zip(limits)
-            .any(|(e, (floor, motion))| *e > ABOVE_NOISE * floor && *e > CONSEQUENTIAL_ERROR * motion)
+        stands_out(error, self.floor, self.motion)
     }
 
     /// Whether re-estimated parameters lower the error of some joint noticeably.
@@ -83,6 +80,15 @@ impl Evidence<'_> {
     }
 }
 
+/// Whether the `error` of some joint is several noise floors and of consequence in relation to the joint's motion; all in rad or m, by joint.
+pub(crate) fn stands_out(error: &[f64], floor: &[f64], motion: &[f64]) -> bool {
+    let limits = floor.iter().zip(motion);
+    error
+        .iter()
+        .zip(limits)
+        .any(|(e, (floor, motion))| *e > ABOVE_NOISE * floor && *e > CONSEQUENTIAL_ERROR * motion)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -95,7 +101,26 @@ mod tests {
         let [before, refit, after] = errors.map(|e| [0.1 * FLOOR, e * FLOOR]);
         let (floor, motion) = ([FLOOR; 2], [1.0, motion * FLOOR]);
         let (before, refit, after) = (&before, &refit, &after);
-        Evidence { named, open, before, refit, after, floor: &floor, motion: &motion }.verdict()
+        Evidence { named, open, in_training: false, before, refit, after, floor: &floor, motion: &motion }
+            .verdict()
+    }
+
+    #[test]
+    fn a_gap_of_the_training_logs_alone_is_unexplained() {
+        let quiet = [FLOOR];
+        let evidence = |in_training, named| Evidence {
+            named,
+            open: false,
+            in_training,
+            before: &quiet,
+            refit: &quiet,
+            after: &quiet,
+            floor: &quiet,
+            motion: &[1.0],
+        };
+        assert_eq!(evidence(false, false).verdict(), Verdict::None);
+        assert_eq!(evidence(true, false).verdict(), Verdict::Unexplained);
+        assert_eq!(evidence(true, true).verdict(), Verdict::Effect);
     }
 
     #[test]
@@ -146,6 +171,7 @@ mod tests {
             Evidence {
                 named,
                 open,
+                in_training: false,
                 before: &after,
                 refit: &after,
                 after: &after,
@@ -176,6 +202,7 @@ mod tests {
                     let evidence = Evidence {
                         named: false,
                         open,
+                        in_training: false,
                         before: &errors,
                         refit: &errors,
                         after: &errors,

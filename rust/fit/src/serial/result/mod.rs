@@ -86,6 +86,7 @@ pub(crate) fn assemble<const N: usize, const P: usize>(
     let evidence = Evidence {
         named: !named.is_empty(),
         open: false,
+        in_training: false,
         before: &gap.before,
         refit: &gap.refit,
         after: &gap.after,
