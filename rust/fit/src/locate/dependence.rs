@@ -1,11 +1,11 @@
 //! Torque that depends on one variable of the motion, as a table.
 
-use nalgebra::SVector;
+use crate::locate::table_form::{MotionPoint, TableForm};
 use schemars::JsonSchema;
 use serde::Serialize;
 
 /// Variable of the motion that a residual torque may depend on; joints are counted from 0.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum MotionVariable {
     /// Position of a joint, rad or m.
     Position(usize),
@@ -17,10 +17,15 @@ pub enum MotionVariable {
     Torque(usize),
     /// Time since the log began, s.
     Time,
+    /// Magnitude of a joint's commanded torque, N m or N.
+    Load(usize),
+    /// Stop operator of a joint's commanded torque with this radius, N m or N: it follows changes of the torque within plus and minus the radius. It
+    /// is the elementary hysteresis of Prandtl and Ishlinskii: the difference between a torque and what a play passes on.
+    Stop(usize, f64),
 }
 
 impl MotionVariable {
-    /// All variables of the motion of `n` joints, those of joint `own` (from 0) first.
+    /// All variables of the motion of `n` joints that results may list, those of joint `own` (from 0) first.
     pub fn all(n: usize, own: usize) -> Vec<Self> {
         let of_joint = |i| [Self::Position(i), Self::Velocity(i), Self::Acceleration(i), Self::Torque(i)];
         (0..n).flat_map(|i| of_joint((own + i) % n)).chain(std::iter::once(Self::Time)).collect()
@@ -34,6 +39,8 @@ impl MotionVariable {
             Self::Acceleration(i) => format!("ddq{}", i + 1),
             Self::Torque(i) => format!("tau{}", i + 1),
             Self::Time => "t".to_owned(),
+            Self::Load(i) => format!("|tau{}|", i + 1),
+            Self::Stop(i, radius) => format!("stop of tau{} within {radius:.3}", i + 1),
         }
     }
 
@@ -43,25 +50,31 @@ impl MotionVariable {
             Self::Position(_) => ["rad", "m"],
             Self::Velocity(_) => ["rad/s", "m/s"],
             Self::Acceleration(_) => ["rad/s^2", "m/s^2"],
-            Self::Torque(_) => ["N m", "N"],
+            Self::Torque(_) | Self::Load(_) | Self::Stop(..) => ["N m", "N"],
             Self::Time => ["s", "s"],
         };
         if rotary { rotary_unit } else { linear_unit }
     }
 
-    /// Value of the variable in a motion (position, velocity, acceleration) under the commanded torque `tau`, at time `t` since the log began.
-    pub fn of<const N: usize>(
-        self,
-        [q, dq, ddq]: &[SVector<f64, N>; 3],
-        tau: &SVector<f64, N>,
-        t: f64,
-    ) -> f64 {
+    /// Value of the variable at every point of a log.
+    pub fn along<const N: usize>(self, points: &[MotionPoint<N>]) -> Vec<f64> {
+        let each = |f: &dyn Fn(&MotionPoint<N>) -> f64| points.iter().map(f).collect();
         match self {
-            Self::Position(i) => q[i],
-            Self::Velocity(i) => dq[i],
-            Self::Acceleration(i) => ddq[i],
-            Self::Torque(i) => tau[i],
-            Self::Time => t,
+            Self::Position(i) => each(&|x| x.motion[0][i]),
+            Self::Velocity(i) => each(&|x| x.motion[1][i]),
+            Self::Acceleration(i) => each(&|x| x.motion[2][i]),
+            Self::Torque(i) => each(&|x| x.tau[i]),
+            Self::Time => each(&|x| x.t),
+            Self::Load(i) => each(&|x| x.tau[i].abs()),
+            Self::Stop(i, radius) => {
+                let mut before = points.first().map_or(0.0, |x| x.tau[i]);
+                let follow = |stop: &mut f64, x: &MotionPoint<N>| {
+                    *stop = (*stop + x.tau[i] - before).clamp(-radius, radius);
+                    before = x.tau[i];
+                    Some(*stop)
+                };
+                points.iter().scan(0.0, follow).collect()
+            }
         }
     }
 }
@@ -74,9 +87,9 @@ pub struct Dependence {
     pub joint: usize,
     /// Name of the variable that the torque depends on: `q1`, `dq1`, `ddq1`, `tau1` and so on, or `t`, the time since the log began.
     pub variable: String,
-    /// Variable that the torque depends on, in a form that can be evaluated.
+    /// Variable that the torque depends on and factor of the table, in a form that can be evaluated.
     #[serde(skip)]
-    pub depends_on: MotionVariable,
+    pub form: TableForm,
     /// SI unit of the variable that the torque depends on.
     pub unit: &'static str,
     /// Share, 0 to 1, of the variance of the joint's residual torque beyond noise that the fitted table predicts in logs it was not fitted to.
@@ -95,24 +108,26 @@ pub struct DependenceLaw {
     pub torque: Vec<f64>,
     /// Standard deviation of the torque in each class, from the scatter over blocks of one second, N m or N.
     pub sigma: Vec<f64>,
-    /// Mean torque to which the table's torques are added, N m or N.
+    /// Mean torque to which the table's torques are added before the table's factor multiplies them, and torque that is added to the product, N m or
+    /// N.
     #[serde(skip)]
-    pub constant: f64,
+    pub constant: [f64; 2],
 }
 
 impl DependenceLaw {
-    /// Torque at the value `x` of the variable, N m or N: `constant` plus linear interpolation of the table, held constant beyond its ends.
-    pub fn at(&self, x: f64) -> f64 {
+    /// Torque at the value `x` of the variable where the table's factor is `factor`, N m or N: `constant` and linear interpolation of the table, held
+    /// constant beyond its ends.
+    pub fn at(&self, [factor, x]: [f64; 2]) -> f64 {
         let (Some(first), Some(last)) = (self.torque.first(), self.torque.last()) else { return 0.0 };
-        self.constant
-            + match self.x.partition_point(|edge| *edge <= x) {
-                0 => *first,
-                i if i == self.x.len() => *last,
-                i => {
-                    let part = (x - self.x[i - 1]) / (self.x[i] - self.x[i - 1]);
-                    self.torque[i - 1] + part * (self.torque[i] - self.torque[i - 1])
-                }
+        let table = match self.x.partition_point(|edge| *edge <= x) {
+            0 => *first,
+            i if i == self.x.len() => *last,
+            i => {
+                let part = (x - self.x[i - 1]) / (self.x[i] - self.x[i - 1]);
+                self.torque[i - 1] + part * (self.torque[i] - self.torque[i - 1])
             }
+        };
+        self.constant[1] + factor * (self.constant[0] + table)
     }
 }
 
@@ -126,10 +141,10 @@ mod tests {
             x: vec![-1.0, 0.0, 2.0],
             torque: vec![0.5, -0.5, 1.5],
             sigma: vec![0.1; 3],
-            constant: 10.0,
+            constant: [8.0, 2.0],
         };
         for (x, torque) in [(-5.0, 10.5), (-1.0, 10.5), (-0.5, 10.0), (1.0, 10.5), (2.0, 11.5), (9.0, 11.5)] {
-            assert!((law.at(x) - torque).abs() < 1e-12, "{x}");
+            assert!((law.at([1.0, x]) - torque).abs() < 1e-12, "{x}");
         }
     }
 }

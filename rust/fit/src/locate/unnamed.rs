@@ -7,13 +7,14 @@
 //! left out, and its residual under the table of the remaining logs is compared with its residual under the parameters alone. The scatter of the gain
 //! over blocks of one second shows whether the gain may be due to chance.
 
-use crate::locate::dependence::{Dependence, DependenceLaw, MotionVariable};
+use crate::locate::dependence::{Dependence, DependenceLaw};
+use crate::locate::table_form::{MotionPoint, TableForm};
 use crate::locate::variable_classes::{CLASSES, Classes};
 use crate::log::track::Track;
 use crate::model::hypothesis::Hypothesis;
 use crate::numeric::low_pass::LowPass;
 use crate::predict::residual_torque::{
-    InverseDynamicsResidual, half_width, inverse_dynamics_residuals, rms_speeds, slow_speeds,
+    InverseDynamicsResidual, half_width, inverse_dynamics_residuals, rms, rms_speeds, slow_speeds,
 };
 use armgap_core::arm::Arm;
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
@@ -87,6 +88,15 @@ impl<const N: usize> LogResidual<N> {
     fn times(&self) -> Vec<f64> {
         self.samples.iter().map(|x| x.t - self.samples[0].t).collect()
     }
+
+    /// Factor and variable of a form at every sample.
+    pub fn along(&self, form: TableForm) -> Vec<[f64; 2]> {
+        let first = self.samples[0].t;
+        let point =
+            |x: &InverseDynamicsResidual<N>| MotionPoint { t: x.t - first, motion: x.motion, tau: x.tau };
+        let points: Vec<MotionPoint<N>> = self.samples.iter().map(point).collect();
+        form.along(&points, &self.slow)
+    }
 }
 
 /// Low-passed residual torque of one joint over all logs, with all variables that it may depend on.
@@ -116,6 +126,8 @@ pub struct Wanted {
     pub most: usize,
     /// Whether the joints are rotary rather than linear.
     pub rotary: bool,
+    /// Forms that the tables of a joint (from 0) may have, where the joints' commanded torques have these standard deviations, N m or N.
+    pub forms: fn(&[f64], usize) -> Vec<TableForm>,
 }
 
 /// Dependences of all joints' residual torques on variables of the motion, strongest first; `sigma`: standard deviations of the parameters `theta`.
@@ -126,7 +138,7 @@ pub fn dependences<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     logs: &[LogResidual<N>],
     wanted: Wanted,
 ) -> Vec<Dependence> {
-    let of_joint = |j| Rest::of_joint(arm, theta, sigma, logs, j).dependences(j + 1, wanted);
+    let of_joint = |j| Rest::of_joint(arm, theta, sigma, logs, j, wanted).dependences(j + 1, wanted);
     let mut found: Vec<Dependence> = (0..N).flat_map(of_joint).collect();
     found.sort_by(|a, b| b.share.total_cmp(&a.share));
     found
@@ -140,6 +152,7 @@ impl Rest {
         sigma: &[f64; P],
         logs: &[LogResidual<N>],
         j: usize,
+        wanted: Wanted,
     ) -> Self {
         let mut rest = Self::default();
         let lows: Vec<LowPass> =
@@ -174,8 +187,8 @@ impl Rest {
             rest.teaches.push(log.teaches);
             kept.push(points);
         }
-        let cut = |variable| Classes::new(variable, logs, &lows, &kept);
-        rest.variables = MotionVariable::all(N, j).into_iter().map(cut).collect();
+        let cut = |form| Classes::new(form, logs, &lows, &kept);
+        rest.variables = (wanted.forms)(&torques(logs), j).into_iter().map(cut).collect();
         rest
     }
 
@@ -221,7 +234,7 @@ impl Rest {
         let mut before = plain;
         while found.len() < wanted.most && whole > self.noise {
             let with = |law| taken.iter().copied().chain(std::iter::once(law)).collect::<Vec<&Classes>>();
-            let open = self.variables.iter().filter(|v| taken.iter().all(|t| t.variable != v.variable));
+            let open = self.variables.iter().filter(|v| taken.iter().all(|t| t.form != v.form));
             let left = open.filter_map(|law| Some((law, self.regression(with(law)).left_out()?)));
             let Some((law, left)) = left.min_by(|(_, a), (_, b)| squares(a).total_cmp(&squares(b))) else {
                 break;
@@ -233,9 +246,9 @@ impl Rest {
             let Some(table) = self.regression(with(law)).last_law() else { break };
             found.push(Dependence {
                 joint,
-                variable: law.variable.name(),
-                depends_on: law.variable,
-                unit: law.variable.unit(wanted.rotary),
+                variable: law.form.variable.name(),
+                form: law.form,
+                unit: law.form.variable.unit(wanted.rotary),
                 share: share.min(1.0),
                 law: table,
             });
@@ -328,7 +341,8 @@ impl Regression<'_> {
         let covariance = &inverse * scatter * &inverse;
         let all: f64 = weight.iter().sum();
         let mean: f64 = (0..CLASSES).map(|c| weight[c] * values[first + c]).sum::<f64>() / all;
-        let constant = mean + values[self.rest.base.first()?.len() - 1];
+        let intercept = values[self.rest.base.first()?.len() - 1];
+        let constant = [mean, intercept];
         let mut law = DependenceLaw { x: Vec::new(), torque: Vec::new(), sigma: Vec::new(), constant };
         for (c, x) in last.mean.iter().enumerate().filter_map(|(c, x)| Some((c, (*x)?))) {
             // Standard deviation of the class's torque less the mean over the classes, as `law.torque` is such a difference.
@@ -340,6 +354,15 @@ impl Regression<'_> {
         }
         Some(law)
     }
+}
+
+/// Standard deviations of all joints' commanded torques over all logs, N m or N.
+fn torques<const N: usize>(logs: &[LogResidual<N>]) -> [f64; N] {
+    std::array::from_fn(|j| {
+        let all = || logs.iter().flat_map(|log| &log.samples).map(|x| x.tau[j]);
+        let mean = all().sum::<f64>() / all().count().max(1) as f64;
+        rms(all().map(|tau| tau - mean))
+    })
 }
 
 fn squares(x: &[f64]) -> f64 {
@@ -361,12 +384,18 @@ fn certainty(before: &[f64], after: &[f64], rest: &Rest) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::locate::dependence::MotionVariable;
+    use crate::locate::table_form::Factor;
     use crate::numeric::random::Random;
     use armgap_core::arm::TwoLink;
 
     fn found_in(logs: &[LogResidual<2>]) -> Vec<Dependence> {
+        found_among(TableForm::listed, logs)
+    }
+
+    fn found_among(forms: fn(&[f64], usize) -> Vec<TableForm>, logs: &[LogResidual<2>]) -> Vec<Dependence> {
         let arm = TwoLink { gravity: 9.81, length1: 0.3 };
-        dependences(&arm, &[0.1; 9], &[0.01; 9], logs, Wanted { most: MAX_TABLES, rotary: true })
+        dependences(&arm, &[0.1; 9], &[0.01; 9], logs, Wanted { most: MAX_TABLES, rotary: true, forms })
     }
 
     /// Logs of two joints that oscillate at different rates, with a given torque on each joint and noise; `memory` is the part of the noise that
@@ -444,5 +473,18 @@ mod tests {
             [if number == 1 { (3.0 * x.motion[0][0]).sin() } else { 0.0 }, 0.0]
         }));
         assert!(found.iter().all(|d| d.variable != "q1"), "{found:?}");
+    }
+
+    #[test]
+    fn friction_whose_size_varies_is_a_table_times_the_direction() {
+        let friction = |x: &InverseDynamicsResidual<2>| {
+            let jump = if x.t > 4.0 { 0.5 } else { -0.5 };
+            [jump * x.motion[1][0].signum(), 0.5 * x.tau[1].abs() * x.motion[1][1].signum()]
+        };
+        let found = found_among(TableForm::rivals, &logs(0.5, |_, x| friction(x)));
+        let first = |joint: usize| found.iter().find(|d| d.joint == joint + 1).map(|d| d.form);
+        let of = |joint: usize, variable| Some(TableForm { factor: Factor::Direction(joint), variable });
+        assert_eq!(first(0), of(0, MotionVariable::Time), "{found:?}");
+        assert_eq!(first(1), of(1, MotionVariable::Load(1)), "{found:?}");
     }
 }

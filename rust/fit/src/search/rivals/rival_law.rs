@@ -2,15 +2,17 @@
 //! cause.
 //!
 //! An effect that is not in the arm is named where it imitates the unmodelled torque better than the other effects do. A table can take any form over
-//! its variable: where it explains much more of the holdout than the named effect, the form of the named effect is wrong.
+//! its variable: where it explains much more of the holdout than the named effect, the form of the named effect is wrong. Further forms than results
+//! list stand for friction, gains and hysteresis that the library does not have (`TableForm::rivals`).
 
 use crate::likelihood::context::{DiagnosisContext, SplitWeighting, WindowSet};
 use crate::likelihood::solve::{Effort, Fit};
 use crate::locate::dependence::Dependence;
+use crate::locate::table_form::{MotionPoint, TableForm};
 use crate::locate::unnamed::{LogResidual, MAX_TABLES, Wanted, dependences};
 use crate::model::custom_effect::{self, UNNAMED};
 use crate::model::hypothesis::{EffectInstance, Hypothesis};
-use crate::predict::residual_torque::measured_motion;
+use crate::predict::residual_torque::{measured_motion, rms_speeds, slow_speeds};
 use crate::predict::window::Dataset;
 use crate::search::acceptance::MATTERS;
 use armgap_core::arm::Arm;
@@ -29,7 +31,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let rest = full - self.floor(weights);
         let predicts =
             |law: &Dependence| full - self.cost_beside(&model.hypothesis, law, weights) > MATTERS * rest;
-        let mut laws = self.dependences(&model.hypothesis, Wanted { most: MAX_TABLES, rotary });
+        let mut laws = self
+            .dependences(&model.hypothesis, Wanted { most: MAX_TABLES, rotary, forms: TableForm::listed });
         laws.retain(predicts);
         laws
     }
@@ -45,10 +48,11 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         dependences(&self.arm, &model.theta, &self.prior.sigma, &logs, wanted)
     }
 
-    /// Cost on the holdout of a model with the table of torque added that best predicts the model's residual torque from one variable of the motion;
-    /// none where no table predicts it.
+    /// Cost on the holdout of a model with the table of torque added that best predicts the model's residual torque, of all forms that a rival may
+    /// have; none where no table predicts it.
     pub(crate) fn rival_cost(&self, model: &Hypothesis<P>, weights: &SplitWeighting<N>) -> Option<f64> {
-        let rival = self.dependences(model, Wanted { most: 1, rotary: true }).into_iter().next()?;
+        let wanted = Wanted { most: 1, rotary: true, forms: TableForm::rivals };
+        let rival = self.dependences(model, wanted).into_iter().next()?;
         Some(self.cost_beside(model, &rival, weights))
     }
 
@@ -69,12 +73,14 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
 fn with_torques<const N: usize>(data: &Dataset<N>, law: &Dependence) -> Dataset<N> {
     let mut data = data.clone();
     for track in &mut data.tracks {
-        let torque = |k: usize| {
-            let motion = measured_motion(track, k);
-            let tau = SVector::from_fn(|j, _| track.held[k][j].mean());
-            law.law.at(law.depends_on.of(&motion, &tau, track.t[k] - track.t[0]))
+        let point = |k: usize| MotionPoint {
+            t: track.t[k] - track.t[0],
+            motion: measured_motion(track, k),
+            tau: SVector::from_fn(|j, _| track.held[k][j].mean()),
         };
-        let torques = (0..track.len()).map(torque).collect();
+        let points: Vec<MotionPoint<N>> = (0..track.len()).map(point).collect();
+        let slow = slow_speeds(track, &rms_speeds(track));
+        let torques = law.form.along(&points, &slow).into_iter().map(|x| law.law.at(x)).collect();
         track.tables.resize(UNNAMED, Vec::new());
         track.tables.push(torques);
     }
