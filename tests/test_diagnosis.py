@@ -96,6 +96,34 @@ def test_a_clean_log_has_no_gap(clean):
     assert clean.causes == ()
 
 
+def loaded_one_way(arm: Arm, seed: int, backlash: Effect) -> Log:
+    """Return a log in which gravity keeps the gap of a transmission closed on one side."""
+    log = swing(arm, seed, noise=2e-5)
+    tau = 0.45 + 0.25 * log.tau[:, 0]
+    loaded = simulate(arm, log.t, tau, effects=[backlash], noise=2e-5, seed=seed, name=log.name)
+    settled = loaded.t > 1.6
+    return dataclasses.replace(loaded, t=loaded.t[settled], q=loaded.q[settled], tau=loaded.tau[settled], moment=None)
+
+
+def test_backlash_that_only_the_training_log_passes_is_no_push(pendulum: Arm) -> None:
+    backlash = Effect("backlash", 1, {"gap": 0.01, "rotor_share": 0.1, "riding": 0.0})
+    training = swing(pendulum, 3, backlash, noise=2e-5)
+    result = diagnose(training, pendulum, holdout=loaded_one_way(pendulum, 4, backlash))
+    assert [(c.effect, c.joint) for c in result.causes] == [("backlash", 1)]
+    assert any("different gaps" in note for note in result.extra["notes"])
+
+
+def test_a_gap_of_the_training_logs_alone_is_no_none(pendulum: Arm) -> None:
+    """The arm of the holdout has no backlash, so learning from stretches of both by turns explains nothing."""
+    backlash = Effect("backlash", 1, {"gap": 0.01, "rotor_share": 0.1, "riding": 0.0})
+    result = diagnose(swing(pendulum, 1, backlash, noise=2e-5), pendulum, holdout=swing(pendulum, 2, noise=2e-5))
+    assert result.verdict == "unexplained"
+    assert result.causes == ()
+    assert any("the training logs show a gap" in note for note in result.extra["notes"])
+    assert {r.status for r in result.ruled_out if r.effect == "backlash"} == {"undecided"}
+    assert "the training logs do" in result.summary()
+
+
 def test_summary_gives_the_three_answers(found, clean):
     text = found.summary()
     assert all(line.strip() for line in text.splitlines())

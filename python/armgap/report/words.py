@@ -471,7 +471,9 @@ def _how_far(data: Data) -> tuple[str, str]:
     elif data["verdict"] == "none":
         headline, errors = "Nothing to shrink", each_joint(after, units=units, joints=joints)
     elif data["verdict"] == "unexplained":
-        headline = "It stays" if exceeds_floor(data, "after") else "The held-out motion shows none; the training logs do"
+        headline = (
+            "It stays" if exceeds_floor(data, "after") else "The held-out motion shows none; the training logs do"
+        )
         errors = each_joint(after, units=units, joints=joints)
     else:
         headline, errors = _share_closed(data), each_joint(before, after, units=units, joints=joints)

@@ -65,8 +65,9 @@ impl WithArm for Request<'_> {
         let is_crosswise = instead.is_some();
         if let Some(instead) = instead {
             (context, conclusion) = instead;
-            in_training = None;
         }
+        // Pushes in the training logs explain what crosswise learning did not.
+        in_training = in_training.filter(|_| !is_crosswise && conclusion.disturbances.is_empty());
         let headline = context.headline(conclusion, max_causes);
         let attribution = &headline.attribution;
         let open = context.open_candidates(&attribution.model.hypothesis).len();
@@ -81,14 +82,14 @@ impl WithArm for Request<'_> {
     }
 }
 
-/// Gap on the training logs that a diagnosis without a cause and without a gap on the holdout leaves.
+/// Gap on the training logs that a diagnosis without a cause and without a gap on the holdout leaves, or takes for external pushes.
 fn training_gap<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     context: &DiagnosisContext<A, N, P>,
     first: &Conclusion<N, P>,
     seed: u64,
 ) -> Option<TrainingGap> {
-    let found = &first.attribution;
-    let is_silent = found.causes.is_empty() && first.disturbances.is_empty() && !found.is_unexplained();
+    let found = first.without_disturbances();
+    let is_silent = found.causes.is_empty() && !found.is_unexplained();
     let last = found.nodes.last().filter(|_| is_silent)?;
     TrainingGap::of(context, &found.model.hypothesis, &last.weights.training.zeros, seed)
 }

@@ -21,15 +21,15 @@ pub struct TrainingGap {
 }
 
 impl TrainingGap {
-    /// Gap that a model leaves on the training logs, beside the encoder zeros of their recordings; none where it is within noise or of no consequence
-    /// in relation to the motion.
+    /// Gap that a model without external pushes leaves on the training logs, beside the encoder zeros of their recordings; none where it is within
+    /// noise or of no consequence in relation to the motion.
     pub fn of<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         context: &DiagnosisContext<A, N, P>,
         model: &Hypothesis<P>,
         zeros: &EncoderZeros<N>,
         seed: u64,
     ) -> Option<Self> {
-        let (data, measured) = (&context.training.data, &context.training.measured);
+        let (data, measured) = (&context.training.data.without_pushes(), &context.training.measured);
         let predicted = data.predict(&context.arm, model, &zeros.offsets(data));
         let floor = floor(context, data, model, &predicted, seed).map(f64::sqrt).to_vec();
         let (missed, motion) =
