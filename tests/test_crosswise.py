@@ -13,7 +13,7 @@ from armgap.report import render_html
 from armgap.simulation import Effect
 from swings import sines
 
-CROSSWISE = "effects fitted to the training logs did not explain the holdout"
+CROSSWISE = "training and holdout logs show different gaps"
 NOISE_RAD = 1e-5
 WIDE_SEED = 3
 
