@@ -10,6 +10,21 @@ from armgap import _native
 
 
 @pytest.mark.parametrize("seed", range(60))
+def test_parameters_that_are_held_do_not_keep_others_at_their_bounds(seed: int) -> None:
+    """Equal bounds hold a parameter, as those of weights in torques that were logged after gravity compensation."""
+    rng = np.random.default_rng(1000 + seed)
+    n = int(rng.integers(3, 10))
+    a = rng.standard_normal((n + 20, n)) + rng.uniform(0, 2) * rng.standard_normal((n + 20, 1))
+    b = a @ (2.0 * rng.standard_normal(n))
+    held = np.arange(n) < 1 + n // 3
+    low, high = np.where(held, 0.0, -0.5), np.where(held, 0.0, 0.5)
+    found = _native.bounded_least_squares(a.T @ a, a.T @ b, low, high)
+    known = np.zeros(n)
+    known[~held] = lsq_linear(a[:, ~held], b, (low[~held], high[~held]), method="bvls", tol=1e-14).x
+    assert np.sum((a @ found - b) ** 2) <= np.sum((a @ known - b) ** 2) * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("seed", range(60))
 def test_bounded_least_squares_agree_with_scipy(seed: int) -> None:
     rng = np.random.default_rng(seed)
     n = int(rng.integers(1, 10))
@@ -23,6 +38,10 @@ def test_bounded_least_squares_agree_with_scipy(seed: int) -> None:
     known = lsq_linear(a, b, (low, high), method="bvls", tol=1e-14).x
     np.testing.assert_array_equal(np.clip(found, low - 1e-12, high + 1e-12), found)
     assert np.sum((a @ found - b) ** 2) <= np.sum((a @ known - b) ** 2) * (1 + 1e-9)
+
+
+def test_nothing_to_estimate() -> None:
+    assert _native.bounded_least_squares(np.zeros((0, 0)), np.zeros(0), np.zeros(0), np.zeros(0)).shape == (0,)
 
 
 def test_no_finite_solution_is_nan() -> None:

@@ -22,8 +22,11 @@ _WITH_GAP: dict[str, tuple[Verdict, ...]] = {
 
 
 def has_gap(data: Data, model: str) -> bool:
-    """Whether a model (``"before"``, ``"refit"`` or ``"after"``) has a gap by the verdict of a diagnosis and, with causes, by its errors."""
-    if data["verdict"] not in _WITH_GAP[model]:
+    """Whether a model (``"before"``, ``"refit"`` or ``"after"``) has a gap by the verdict of a diagnosis and, with causes, by its errors.
+
+    A gap that only the training logs show is none on the holdout.
+    """
+    if data["verdict"] not in _WITH_GAP[model] or data["gap"].get("training"):
         return False
     return model != "after" or data["verdict"] != "effect" or exceeds_floor(data, model)
 

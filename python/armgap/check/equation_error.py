@@ -89,7 +89,7 @@ class Rows:
         return cls(_taken(psi, rows), _taken(y, rows), rows + part.start, cutoff)
 
     def read_as(self, log: Log, arm: Arm) -> Rows:
-        """Return the rows of another reading `log` of the log that these rows belong to, with the same times, at the same samples."""
+        """Return the rows, made by `Rows.of` without `around`, of another reading `log` of their log, at the same samples and times."""
         part = _part(log, None)
         t, q, tau = (np.ascontiguousarray(x[part]) for x in (log.t, log.q, log.tau))
         psi, y = _native.regression_rows(arm.to_native(), t, q, tau, self.cutoff)
@@ -123,7 +123,7 @@ class Rows:
         return replace(self, psi=self.psi * mask[:, :, None], y=self.y * mask)
 
     def with_torque(self, log: Log, joint: int, torque: Array) -> Rows:
-        """Return the rows of a log (`Rows.of`) with other torques of one joint (from 0), given at all samples [N m or N]."""
+        """Return the rows of a log (`Rows.of` without `around`) with other torques of one joint (from 0), given at all samples [N m or N]."""
         part = _part(log, None)
         t, tau = (np.ascontiguousarray(x[part]) for x in (log.t, torque))
         y = self.y.copy()

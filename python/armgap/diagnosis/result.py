@@ -87,6 +87,22 @@ class SecondHalves:
 
 
 @dataclass(frozen=True)
+class TrainingErrors:
+    """RMS position error per joint on the training logs, with parameters re-estimated from them.
+
+    Attributes
+    ----------
+    after : tuple of float
+        Error of the re-estimated arm [rad or m].
+    floor : tuple of float
+        Error of a perfect model: noise, and errors of the measured starts [rad or m].
+    """
+
+    after: tuple[float, ...]
+    floor: tuple[float, ...]
+
+
+@dataclass(frozen=True)
 class Gap:
     """Gap on the holdout: RMS error of predicted positions per joint.
 
@@ -111,6 +127,8 @@ class Gap:
         Share of the gap above the floor, parameters re-estimated, that remains with the named causes, from 0 to 1.
     second_halves : SecondHalves, optional
         Gap with encoder zeros re-estimated per recording; None for a single training recording.
+    training : TrainingErrors, optional
+        Gap on the training logs where no cause is named and the holdout shows none; else None.
     """
 
     horizon_s: float
@@ -126,6 +144,7 @@ class Gap:
     motion: tuple[float, ...] = ()
     unexplained: float = 0.0
     second_halves: SecondHalves | None = None
+    training: TrainingErrors | None = None
 
 
 @dataclass(frozen=True)
@@ -386,6 +405,9 @@ class Diagnosis(NotebookDisplay):
                 gap.get("unexplained", 0.0),
                 SecondHalves(**{key: tuple(x) for key, x in halves.items()})
                 if (halves := gap.get("second_halves"))
+                else None,
+                TrainingErrors(**{key: tuple(x) for key, x in errors.items()})
+                if (errors := gap.get("training"))
                 else None,
             ),
             where=tuple(_location(p) for p in data["where"]),

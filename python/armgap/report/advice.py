@@ -86,6 +86,11 @@ def _alike(cause: Data) -> str:
 
 
 def _unexplained(data: Data) -> list[str]:
+    if data["gap"].get("training"):
+        return [
+            "Exchange training and holdout logs, or record logs that both hold all motions, and diagnose again.",
+            *_excite(data),
+        ]
     places = data.get("where") or []
     steps = [f"Look at joint {places[0]['joint']} first: that is where the torque is lacking."] if places else []
     return [*steps, _LOG_MORE, *([] if _is_serial(data) else [_OWN]), *_excite(data)]

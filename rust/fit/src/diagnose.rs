@@ -11,9 +11,10 @@ use crate::model::custom_effect;
 use crate::model::hypothesis::EffectInstance;
 use crate::predict::window::Dataset;
 use crate::progress::{Observer, Phase, ProgressReporter, guarded};
-use crate::result::report::Diagnosis;
+use crate::result::headline::Headline;
+use crate::result::report::{Diagnosis, TrainingErrors};
 use crate::result::sanity::bounded_sigma;
-use crate::result::training_gap::TrainingGap;
+use crate::result::training_gap::training_gap;
 use crate::search::crosswise::{crosswise, explains};
 use armgap_core::arm::Arm;
 use std::time::Instant;
@@ -60,15 +61,14 @@ impl WithArm for Request<'_> {
         let mut context = self.context::<A, N, P>(arm.clone(), theta, self.training, self.holdout)?;
         let Options { max_causes, seed, .. } = *self.options;
         let mut conclusion = context.conclude(context.attribute(max_causes, seed, None), max_causes, seed);
-        let mut in_training = training_gap(&context, &conclusion, seed);
-        let instead = self.crosswise(arm, theta, &context, &conclusion, in_training.is_some())?;
+        let hidden = max_causes > 0 && hidden_in_training(&context, &conclusion, seed);
+        let instead = self.crosswise(arm, theta, &context, &conclusion, hidden)?;
         let is_crosswise = instead.is_some();
         if let Some(instead) = instead {
             (context, conclusion) = instead;
         }
-        // Pushes in the training logs explain what crosswise learning did not.
-        in_training = in_training.filter(|_| !is_crosswise && conclusion.disturbances.is_empty());
         let headline = context.headline(conclusion, max_causes);
+        let in_training = if is_crosswise { None } else { left_in_training(&context, &headline, seed) };
         let attribution = &headline.attribution;
         let open = context.open_candidates(&attribution.model.hypothesis).len();
         context.progress.begin(Phase::Result, open + attribution.nodes[0].field.len());
@@ -82,33 +82,49 @@ impl WithArm for Request<'_> {
     }
 }
 
-/// Gap on the training logs that a diagnosis without a cause and without a gap on the holdout leaves, or takes for external pushes.
-fn training_gap<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+/// Whether the training logs show a gap, which a diagnosis took for external pushes or for nothing, and the holdout does not.
+fn hidden_in_training<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     context: &DiagnosisContext<A, N, P>,
     first: &Conclusion<N, P>,
     seed: u64,
-) -> Option<TrainingGap> {
+) -> bool {
     let found = first.without_disturbances();
-    let is_silent = found.causes.is_empty() && !found.is_unexplained();
-    let last = found.nodes.last().filter(|_| is_silent)?;
-    TrainingGap::of(context, &found.model.hypothesis, &last.weights.training.zeros, seed)
+    let Some(last) = found.nodes.last() else { return false };
+    if !found.causes.is_empty() || found.is_unexplained() {
+        return false;
+    }
+    let (bare, zeros) = (context.training.data.without_pushes(), &last.weights.training.zeros);
+    training_gap(context, &bare, &found.model.hypothesis, zeros, seed).is_some()
+}
+
+/// Gap that the reported model leaves on the training logs, where no cause is named and the holdout shows no gap.
+fn left_in_training<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    context: &DiagnosisContext<A, N, P>,
+    headline: &Headline<N, P>,
+    seed: u64,
+) -> Option<TrainingErrors> {
+    if headline.open || !headline.causes.is_empty() || !headline.disturbances.is_empty() {
+        return None;
+    }
+    let zeros = &headline.weights.training.zeros;
+    training_gap(context, &context.training.data, &headline.model.hypothesis, zeros, seed)
 }
 
 impl Request<'_> {
     /// The diagnosis by interleaved cross-validation, where it explains what the diagnosis `first` left open or took for external disturbances, or
-    /// what only the training logs show (`in_training`).
+    /// what only the training logs show (`hidden`).
     fn crosswise<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         &self,
         arm: A,
         theta: [f64; P],
         plain: &DiagnosisContext<A, N, P>,
         first: &Conclusion<N, P>,
-        in_training: bool,
+        hidden: bool,
     ) -> Result<Option<(DiagnosisContext<A, N, P>, Conclusion<N, P>)>, DiagnoseError> {
         let Options { max_causes, seed, horizon, .. } = *self.options;
         let pushed = first.disturbances.iter().any(|e| e.probability > NAMED_DISTURBANCE);
         let open = first.attribution.is_unexplained() || pushed;
-        let differ = in_training || (open && plain.holdout_shows_more(first.without_disturbances()));
+        let differ = hidden || (open && plain.holdout_shows_more(first.without_disturbances()));
         if !differ {
             return Ok(None);
         }

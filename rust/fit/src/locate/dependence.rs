@@ -104,7 +104,7 @@ pub struct Dependence {
 pub struct DependenceLaw {
     /// Mean of the variable in each class, ascending, in the variable's SI unit.
     pub x: Vec<f64>,
-    /// Torque in each class of the variable less the mean torque `constant`, N m or N.
+    /// Torque in each class of the variable less the mean torque `constant`, N m or N; where the table has a factor, per unit of the factor.
     pub torque: Vec<f64>,
     /// Standard deviation of the torque in each class, from the scatter over blocks of one second, N m or N.
     pub sigma: Vec<f64>,

@@ -211,15 +211,12 @@ impl Rest {
             matrix.ger(1.0, &row, &row, 1.0);
             right.axpy(*y, &row, 1.0);
         }
-        // The prior of the parameters is the arm file's; a class counts as if it had one further point, with zero torque.
+        // The prior of the parameters is the arm file's; a class counts as if it had one further point, with a typical factor and zero torque.
         let variance = self.torque.iter().map(|y| y * y).sum::<f64>() / self.torque.len().max(1) as f64;
-        let precision = (0..k).map(|i| if i < own - 1 { CORRELATED * variance } else { 1.0 });
-        Regression {
-            rest: self,
-            laws,
-            normal,
-            ridge: DMatrix::from_diagonal(&DVector::from_iterator(k, precision)),
-        }
+        let of_table = |i: usize| if i < own { 1.0 } else { laws[(i - own) / CLASSES].factor_square };
+        let precision = (0..k).map(|i| if i + 1 < own { CORRELATED * variance } else { of_table(i) });
+        let ridge = DMatrix::from_diagonal(&DVector::from_iterator(k, precision));
+        Regression { rest: self, laws, normal, ridge }
     }
 
     /// Dependences of the joint's residual torque, found by forward selection, in the order in which they were added.
@@ -334,7 +331,7 @@ impl Regression<'_> {
         let mut weight = [0.0; CLASSES];
         for i in (0..self.rest.torque.len()).filter(|i| teaches[self.rest.log[*i]]) {
             scores[self.rest.block[i]].axpy(self.left(&values, i), &self.row(i), 1.0);
-            (0..CLASSES).for_each(|c| weight[c] += last.share[i][c]);
+            (0..CLASSES).for_each(|c| weight[c] += last.share[i][c].abs());
         }
         let scatter = scores.iter().fold(DMatrix::zeros(k, k), |sum, s| sum + s * s.transpose());
         let inverse = system.inverse();

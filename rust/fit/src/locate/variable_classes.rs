@@ -18,6 +18,8 @@ pub struct Classes {
     /// For each point that is kept, the share of the low-pass filter's weights around the point that falls on samples in each class of the variable,
     /// each sample times its factor.
     pub share: Vec<[f64; CLASSES]>,
+    /// Mean square of the factor over all samples, the factor's unit squared.
+    pub factor_square: f64,
 }
 
 impl Classes {
@@ -49,7 +51,9 @@ impl Classes {
             }
         }
         let mean = std::array::from_fn(|c| (count[c] > 0.0).then(|| sum[c] / count[c]));
-        Self { form, mean, share }
+        let factors: Vec<f64> = along.iter().flatten().map(|x| x[0] * x[0]).collect();
+        let factor_square = factors.iter().sum::<f64>() / factors.len().max(1) as f64;
+        Self { form, mean, share, factor_square }
     }
 }
 

@@ -19,6 +19,9 @@ pub fn bounded_least_squares(gram: &[f64], right: &[f64], low: &[f64], high: &[f
     if gram.len() != n * n || low.len() != n || high.len() != n {
         return None;
     }
+    if n == 0 {
+        return Some(Vec::new());
+    }
     let gram = DMatrix::from_row_slice(n, n, gram);
     let size = DVector::from_fn(n, |i, _| if gram[(i, i)] == 0.0 { 1.0 } else { gram[(i, i)].sqrt() });
     let scaled = |values: &[f64]| DVector::from_fn(n, |i, _| values[i] * size[i]);
@@ -61,7 +64,7 @@ impl Problem {
             let slope = &self.gram * &x - &self.right;
             // A bound is left where the cost falls towards the inside.
             let inward = |i: usize| if x[i] <= self.low[i] { -slope[i] } else { slope[i] };
-            let held = (0..n).filter(|&i| !free[i]);
+            let held = (0..n).filter(|&i| !free[i] && self.low[i] < self.high[i]);
             match held.max_by(|&a, &b| inward(a).total_cmp(&inward(b))) {
                 Some(best) if inward(best) > settled => free[best] = true,
                 _ => break,
@@ -134,6 +137,21 @@ mod tests {
     fn equal_bounds_hold_a_parameter() {
         let x = bounded_least_squares(&GRAM, &RIGHT, &[1.0, -9.0], &[1.0, 9.0]).expect("solvable");
         assert!((x[0] - 1.0).abs() < 1e-15 && (x[1] + 8.0 / 9.0).abs() < 1e-8, "{x:?}");
+    }
+
+    #[test]
+    fn beside_a_parameter_that_is_held_another_leaves_its_bound() {
+        // Without bounds the minimum is (4, -5, 3): the first guess clips the second parameter to its bound, which it has to leave once the first
+        // one, held at zero, pulls it up; the third is held and would like to grow.
+        let gram = [1.0, 0.8, 0.0, 0.8, 1.0, 0.0, 0.0, 0.0, 1.0];
+        let right = [0.0, -1.8 + 4.0 * 0.8 - 0.4, 3.0];
+        let x = bounded_least_squares(&gram, &right, &[0.0, 0.0, 0.0], &[0.0, 9.0, 0.0]).expect("solvable");
+        assert!((x[1] - right[1]).abs() < 1e-8 && x[0] == 0.0 && x[2] == 0.0, "{x:?}");
+    }
+
+    #[test]
+    fn no_parameter_has_an_empty_solution() {
+        assert_eq!(bounded_least_squares(&[], &[], &[], &[]), Some(Vec::new()));
     }
 
     #[test]

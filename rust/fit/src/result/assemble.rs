@@ -16,12 +16,12 @@ use crate::result::gap::{Compared, Errors, FreeRuns, gap};
 use crate::result::headline::Headline;
 use crate::result::report::{
     self, ArmSummary, Cause, CauseValue, Diagnosis, EquivalentSummary, Gap, LogSummary, Named, Noise,
-    OptionSummary, Parameters, Ranked, SecondHalves, SeveralJoints, SidesSummary, StageSummary, Value,
-    Values,
+    OptionSummary, Parameters, Ranked, SecondHalves, SeveralJoints, SidesSummary, StageSummary,
+    TrainingErrors, Value, Values,
 };
 use crate::result::ruled_out::ruled_out;
 use crate::result::sanity::{Estimate, Sanity, bounded_sigma, sanity};
-use crate::result::training_gap::TrainingGap;
+use crate::result::training_gap::remark;
 use crate::result::verdict::{Evidence, Verdict};
 use crate::search::attribute::Candidate;
 use crate::search::belief::left_over;
@@ -39,7 +39,7 @@ const ZEROS_MATTER: f64 = 0.1;
 pub fn assemble<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     context: &DiagnosisContext<A, N, P>,
     headline: &Headline<N, P>,
-    in_training: Option<TrainingGap>,
+    in_training: Option<TrainingErrors>,
     description: &ArmDescription,
     options: &Options,
 ) -> Diagnosis {
@@ -63,18 +63,16 @@ pub fn assemble<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         let regimes = regimes(&residuals, rotary);
         (residuals, regimes)
     };
-    let candidates = || {
-        (
-            ruled_out(context, attribution, in_training.is_some(), rotary),
-            ranking(context, attribution, rotary),
-        )
-    };
-    let ((absent, ranking), ((gap, beside_zeros, series, free_run_series), (residuals, regimes))) =
+    let hidden = in_training.is_some();
+    let candidates =
+        || (ruled_out(context, attribution, hidden, rotary), ranking(context, attribution, rotary));
+    let ((absent, ranking), ((mut gap, beside_zeros, series, free_run_series), (residuals, regimes))) =
         rayon::join(candidates, || rayon::join(figures, residual));
+    gap.training = in_training;
     let evidence = Evidence {
         named: !headline.causes.is_empty() || !disturbances.is_empty(),
         open: headline.open,
-        in_training: in_training.is_some(),
+        in_training: gap.training.is_some(),
         before: &gap.before,
         refit: &gap.refit,
         after: &beside_zeros,
@@ -86,7 +84,7 @@ pub fn assemble<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         if remains { context.laws_beside(&headline.model, &headline.weights, rotary) } else { Vec::new() };
     let sanity = sanity(description.kind, &estimates(&headline.model, description), remains);
     let mut notes = notes(headline, options.max_causes, remains, &sanity, &gap, description);
-    notes.extend(in_training.map(|found| found.remark(gap.unit)));
+    notes.extend(gap.training.as_ref().map(|found| remark(found, gap.unit)));
     Diagnosis {
         schema: "armgap.diagnosis/1",
         verdict,

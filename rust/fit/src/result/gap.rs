@@ -122,6 +122,7 @@ pub fn gap<A: Arm<f64, N, P>, const N: usize, const P: usize>(
             after: rms::<N>(&free.measured, &free.after),
         },
         second_halves: second_halves(context, &compared.after, weights),
+        training: None,
         before,
         after,
         floor,

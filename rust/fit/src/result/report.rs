@@ -166,6 +166,20 @@ pub struct Gap {
     /// recordings.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub second_halves: Option<SecondHalves>,
+    /// Gap on the training logs; only where no cause is named, they show a gap, and the holdout shows none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub training: Option<TrainingErrors>,
+}
+
+/// RMS position errors, over the horizon, on the training logs, with parameters re-estimated from them.
+#[derive(Debug, Clone, JsonSchema, Serialize)]
+pub struct TrainingErrors {
+    /// RMS position error by joint, rad or m.
+    #[schemars(inner(range(min = 0)))]
+    pub after: Vec<f64>,
+    /// RMS position error by joint of a perfect model, rad or m: noise of the measurements and of the measured initial states.
+    #[schemars(inner(range(min = 0)))]
+    pub floor: Vec<f64>,
 }
 
 /// RMS position errors, over the horizon, on the second half of each holdout log, with the named causes.

@@ -56,16 +56,21 @@ pub fn ruled_out<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         }
     }
     let mut entries: Vec<RuledOut> = list.into_iter().map(|(_, entry)| entry).collect();
-    entries.extend(never_fitted::<N>());
+    entries.extend(never_fitted::<N>(in_training));
     entries
 }
 
 /// Status of the effects for which no candidate is tested: external disturbances, and effects that other values always imitate.
-fn never_fitted<const N: usize>() -> Vec<RuledOut> {
+fn never_fitted<const N: usize>(in_training: bool) -> Vec<RuledOut> {
     let laws = catalogue::<f64>().iter().map(|law| law.spec());
     let unsearched = laws.filter(|spec| spec.initial_guesses.is_empty() && spec.least_joints <= N);
     let entry = |spec: &Spec, joint: Option<usize>| {
-        let (status, why) = if spec.trial == Trial::Disturbance {
+        let (status, why) = if spec.trial == Trial::Disturbance && in_training {
+            (
+                Status::Undecided,
+                "the training logs show a gap that pushes may have made, though none stands out",
+            )
+        } else if spec.trial == Trial::Disturbance {
             (
                 Status::Absent,
                 "no push stands out of what the model lacks in any of these logs; a joint at rest shows none below its friction",

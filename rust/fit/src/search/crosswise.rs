@@ -1,7 +1,8 @@
-//! Interleaved cross-validation, for training logs that do not excite an effect which the holdout excites.
+//! Interleaved cross-validation, for training and holdout logs of which only one excites an effect.
 //!
 //! A joint limit may be reached only by the motion of the holdout, and a spring may differ from friction only at the holdout's speeds. No effect
-//! fitted to the training logs explains such a gap, so that even the right effect is not accepted. So where a diagnosis ends with a gap, every log is
+//! fitted to the training logs explains such a gap, so that even the right effect is not accepted; and of an effect that only the training logs
+//! excite, the holdout shows nothing. So where a diagnosis ends with a gap, or the training logs show one that the holdout does not, every log is
 //! cut into stretches, of which every other one is fitted to and the rest judged on. Both kinds of motion are then in both sets, and an effect that
 //! explains nearly all of the gap has been judged on stretches that it was not fitted to.
 
@@ -31,8 +32,8 @@ const MUCH_LESS: f64 = 0.1;
 const MORE: f64 = 2.0;
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// Whether a model search ended with a much larger prediction error on the holdout than on the training logs: only then can interleaved
-    /// cross-validation find more than the logs as they are divided.
+    /// Whether a model search ended with a much larger prediction error on the holdout than on the training logs: interleaved cross-validation
+    /// may then find more than the logs as they are divided.
     pub(crate) fn holdout_shows_more(&self, attribution: &Attribution<N, P>) -> bool {
         let Some(last) = attribution.nodes.last() else { return false };
         let per_row = |costs: &[f64], rows: usize| costs.iter().sum::<f64>() / rows as f64;

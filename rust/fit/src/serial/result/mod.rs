@@ -214,6 +214,7 @@ fn gap<const N: usize, const P: usize>(
         horizons: HORIZONS.iter().filter_map(|h| at_horizon(compared, data, *h)).collect(),
         free_run: FreeRun { before: Vec::new(), after: Vec::new() },
         second_halves: None,
+        training: None,
         before,
         refit,
         after,
