@@ -88,15 +88,7 @@ class SecondHalves:
 
 @dataclass(frozen=True)
 class TrainingErrors:
-    """RMS position error per joint on the training logs, with parameters re-estimated from them.
-
-    Attributes
-    ----------
-    after : tuple of float
-        Error of the re-estimated arm [rad or m].
-    floor : tuple of float
-        Error of a perfect model: noise, and errors of the measured starts [rad or m].
-    """
+    """RMS position error per joint [rad or m] on the training logs: `after` of the re-estimated arm, `floor` of a perfect model."""
 
     after: tuple[float, ...]
     floor: tuple[float, ...]
