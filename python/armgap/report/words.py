@@ -471,9 +471,7 @@ def _how_far(data: Data) -> tuple[str, str]:
     elif data["verdict"] == "none":
         headline, errors = "Nothing to shrink", each_joint(after, units=units, joints=joints)
     elif data["verdict"] == "unexplained":
-        headline = (
-            "It stays" if exceeds_floor(data, "after") else "The held-out motion shows none; the training logs do"
-        )
+        headline = "The held-out motion shows none; the training logs do" if gap.get("training") else "It stays"
         errors = each_joint(after, units=units, joints=joints)
     else:
         headline, errors = _share_closed(data), each_joint(before, after, units=units, joints=joints)

@@ -97,7 +97,7 @@ fn hidden_in_training<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     training_gap(context, &bare, &found.model.hypothesis, zeros, seed).is_some()
 }
 
-/// Gap that the reported model leaves on the training logs, where no cause is named and the holdout shows no gap.
+/// Gap that the reported model leaves on the training logs, where no cause is named and the model search has explained the holdout.
 fn left_in_training<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     context: &DiagnosisContext<A, N, P>,
     headline: &Headline<N, P>,

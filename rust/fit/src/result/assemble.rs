@@ -22,7 +22,7 @@ use crate::result::report::{
 use crate::result::ruled_out::ruled_out;
 use crate::result::sanity::{Estimate, Sanity, bounded_sigma, sanity};
 use crate::result::training_gap::remark;
-use crate::result::verdict::{Evidence, Verdict};
+use crate::result::verdict::{Evidence, Verdict, stands_out};
 use crate::search::attribute::Candidate;
 use crate::search::belief::left_over;
 use crate::search::model_search::Attribution;
@@ -68,7 +68,7 @@ pub fn assemble<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         || (ruled_out(context, attribution, hidden, rotary), ranking(context, attribution, rotary));
     let ((absent, ranking), ((mut gap, beside_zeros, series, free_run_series), (residuals, regimes))) =
         rayon::join(candidates, || rayon::join(figures, residual));
-    gap.training = in_training;
+    gap.training = in_training.filter(|_| !stands_out(&beside_zeros, &gap.floor, &gap.motion));
     let evidence = Evidence {
         named: !headline.causes.is_empty() || !disturbances.is_empty(),
         open: headline.open,
