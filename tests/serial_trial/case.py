@@ -14,7 +14,7 @@ from armgap.arm.serial.chain import SerialChain
 from armgap.literals import SERIAL
 
 from .arms import SerialRobot, draw_robot, perturbed
-from .effects import EFFECTS, Effect, Null
+from .effects import BESIDE, EFFECTS, OUTSIDE, Clutter, Effect, Null, Use
 from .motion import (
     COMMANDED_PERIODS,
     PERIODS,
@@ -44,10 +44,13 @@ LEAST = 0.03
 NOISE = (0.0, 0.01, 0.02)
 #: Largest number of draws for a case, of which the first with a usable motion and a hidden effect of sufficient size is taken.
 _DRAWS = 80
+_KINDS = {effect.name: effect for effect in OUTSIDE} | COMMANDED
 _LOGS = ("train-1", "train-2", "holdout-1")
 _DURATION_S = 12.0
-#: Number of the first null case.
-NULLS = 1_000_000
+#: Numbers of the first case without an effect, with an effect that the library does not have, and with clutter.
+NULLS, OUTSIDES, CLUTTERS = 1_000_000, 2_000_000, 3_000_000
+#: Number of effects beside the main one in clutter, and their aimed changes of a joint's torque as shares of that of the main effect.
+_BESIDE, _SHARES = (2, 4), (0.1, 1 / 3)
 
 
 @dataclass(frozen=True)
@@ -74,7 +77,12 @@ class Case:
 
 def effect_of(seed: int, number: int, *, commanded: bool = False) -> str:
     """Return the name of a case's effect: among as many consecutive cases as there are effects, each has another, in an order by the seed."""
-    effects = list(COMMANDED if commanded else EFFECTS)
+    if number >= CLUTTERS:
+        effects, number = [name for name, effect in EFFECTS.items() if not effect.outside], number - CLUTTERS
+    elif number >= OUTSIDES:
+        effects, number = [effect.name for effect in OUTSIDE], number - OUTSIDES
+    else:
+        effects = list(COMMANDED if commanded else EFFECTS)
     turn, place = divmod(number, len(effects))
     return effects[int(np.random.default_rng([seed, turn, 7]).permutation(len(effects))[place])]
 
@@ -140,11 +148,11 @@ def make_case(
     RuntimeError
         If no draw has a usable motion and an effect of sufficient size.
     """
-    name = effect or ("null" if number >= NULLS else effect_of(seed, number, commanded=commanded))
-    kind = COMMANDED.get(name, Null) if isinstance(name, str) else name
+    name = effect or ("null" if NULLS <= number < OUTSIDES else effect_of(seed, number, commanded=commanded))
+    kind = _KINDS.get(name, Null) if isinstance(name, str) else name
     for draw in range(_DRAWS):
         rng = np.random.default_rng([seed, number, draw])
-        case = _draw(rng, kind, family, joints, duration, commanded=commanded)
+        case = _draw(rng, kind, family, joints, duration, commanded=commanded, clutter=number >= CLUTTERS)
         if case is not None:
             case.key.update(seed=seed, number=number, draw=draw)
             return case
@@ -159,6 +167,7 @@ def _draw(
     duration: float,
     *,
     commanded: bool,
+    clutter: bool,
 ) -> Case | None:
     robot = draw_robot(rng, family, joints)
     trust = "trusted" if kind.trusted_inertia else "published"
@@ -183,6 +192,8 @@ def _draw(
         return None
     use = use_of(first)
     hidden = kind.draw(clean, joint, share, use, rng)
+    if clutter:
+        hidden = _cluttered(hidden, clean, share, use, rng)
     robot, bare = hidden.without(robot), hidden.without(clean)
     if bare is not clean:
         clean = bare
@@ -218,15 +229,33 @@ def _draw(
         )
         for name, r, reference in zip(_LOGS, runs, references, strict=True)
     ]
+    main = hidden.main if isinstance(hidden, Clutter) else hidden
+    beside = hidden.beside if isinstance(hidden, Clutter) else []
     key = {
-        "effect": hidden.name, "joint": None if hidden.joint is None else hidden.joint + 1, "values": hidden.values,
-        "outside": hidden.outside, "change": float(change[at]), "changes": change.tolist(), "family": robot.name, "joints": robot.n,
+        "effect": main.name, "joint": None if hidden.joint is None else hidden.joint + 1, "values": main.values,
+        "outside": main.outside, "beside": [_told(effect) for effect in beside],
+        "change": float(change[at]), "changes": change.tolist(), "family": robot.name, "joints": robot.n,
         "kinds": "".join(kind[0].upper() for kind in robot.kinds), "period": period, "noise": noise, "controller": controlled,
         "theta": truth.theta.tolist(),
     }  # fmt: skip
     if plain and not commanded:
         key |= visibility(robot, sigma_of(robot, trust), plain, runs).to_dict()
     return Case(arm, logs[:-1], logs[-1:], key)
+
+
+def _told(effect: Effect) -> dict[str, Any]:
+    """Return the entries of a case's key about an effect beside the main one."""
+    return {"effect": effect.name, "joint": (effect.joint or 0) + 1, "values": effect.values, "outside": effect.outside}
+
+
+def _cluttered(main: Effect, robot: SerialRobot, share: float, use: Use, rng: np.random.Generator) -> Clutter:
+    """Return clutter around a main effect: effects of other kinds, on joints drawn at random."""
+    clutter = Clutter(main.joint, main)
+    kinds = [kind for kind in BESIDE if not main.name.startswith(kind.name)]
+    for place in rng.permutation(len(kinds))[: int(rng.integers(_BESIDE[0], _BESIDE[1] + 1))]:
+        size = share * float(np.exp(rng.uniform(*np.log(_SHARES))))
+        clutter.beside.append(kinds[int(place)].draw(robot, int(rng.integers(robot.n)), size, use, rng))
+    return clutter
 
 
 def _change(without: Run, with_it: Run) -> Array:
@@ -239,4 +268,4 @@ def hidden_effect(key: dict[str, Any]) -> Effect:
     """Return the hidden effect that the key of a case describes."""
     joint = None if key["joint"] is None else key["joint"] - 1
     values = {k: np.array(v) if isinstance(v, list) else v for k, v in key["values"].items()}
-    return COMMANDED.get(key["effect"], Null)(joint, **values)
+    return _KINDS.get(key["effect"], Null)(joint, **values)

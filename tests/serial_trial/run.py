@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import time
 from collections.abc import Callable
 from typing import Any
@@ -22,12 +23,14 @@ OUTCOMES = ("right", "look-alike", "later", "value", "candidate", "not named", "
 _VALUE = 0.2
 #: Suffix of the names of effects that act on every joint.
 _ALL = "_all"
+#: Bounds of the ranges of probabilities in which names are counted.
+_RANGES = (0.0, 0.5, 0.75, 0.9, 1.01)
 #: Hidden effects that depend on a weighted sum of two joints' positions or velocities, with their names in the library.
 _ON_ROW = {"cable_spring": "joint_spring", "coupled_transmission": "coupled_transmission"}
 #: Entries of a case's key that are copied into the record of its answer.
 _TOLD = (
     "seed", "number", "draw", "effect", "joint", "values", "outside", "change", "family", "joints", "kinds", "period", "noise", "controller",
-    "above_floor", "moved", "visible",
+    "above_floor", "moved", "visible", "beside",
 )  # fmt: skip
 
 
@@ -44,6 +47,7 @@ def ask(case: Case) -> Record:
         "verdict": found.verdict, "causes": causes, "candidates": candidates, "gap": data["gap"], "seconds": seconds,
         "parameters": {name: value.value for name, value in found.parameters["refit"].items()},
         "theta": case.key["theta"], "notes": data["notes"],
+        "unnamed": [{k: law[k] for k in ("joint", "variable", "share")} for law in data["unnamed"]],
     }  # fmt: skip
     return record | {"outcome": outcome(record)}
 
@@ -63,6 +67,13 @@ def is_hidden(record: Record, name: dict[str, Any]) -> bool:
         place = name.get("joints") == [first, first + 1] and name.get("row") == [1, int(factor)]
         return bool(place and name["effect"] == _ON_ROW[effect])
     return bool(name["effect"] == record["effect"] and name["joint"] == record["joint"])
+
+
+def is_in_arm(record: Record, name: dict[str, Any]) -> bool:
+    """Return whether a cause, or one of its equivalents, is the hidden effect or one of those beside it."""
+    names = [name, *name.get("equivalents", ())]
+    hidden = [record, *({**record, **effect} for effect in record["beside"])]
+    return any(is_hidden(effect, n) for effect in hidden for n in names if not effect["outside"])
 
 
 def outcome(record: Record) -> str:
@@ -99,7 +110,8 @@ def report(records: list[Record]) -> str:
     """Return the tables of outcomes and a line for every case whose answer is not right, as text."""
     failed = [r for r in records if "failed" in r]
     answers = [r for r in records if "failed" not in r]
-    hidden = [r for r in answers if r["effect"] != "null" and not r["outside"]]
+    cluttered = [r for r in answers if r["beside"]]
+    hidden = [r for r in answers if r["effect"] != "null" and not r["outside"] and not r["beside"]]
     outside = [r for r in answers if r["outside"]]
     nulls = [r for r in answers if r["effect"] == "null"]
     lines = [f"{len(answers)} answers, {len(failed)} failed", ""]
@@ -114,6 +126,11 @@ def report(records: list[Record]) -> str:
             lines.append(
                 f"{label}: {len(named)} of {len(of)} with a cause named, {sure} of them at a probability of 0.5 or more"
             )
+    if cluttered:
+        lines += ["", *_table("with others", cluttered, lambda r: r["effect"])]
+    for label, of in (("effects with others beside them", cluttered), ("all answers", answers)):
+        if of:
+            lines += [f"{label}: right names by probability", *_calibration(of), ""]
     everywhere = [r for r in hidden if r["effect"].endswith(_ALL)]
     if everywhere:
         one = sum(
@@ -129,8 +146,23 @@ def report(records: list[Record]) -> str:
         lines.append(f"seconds per diagnosis: median {np.median(seconds):.1f}, longest {max(seconds):.1f}")
     good = ("right", "look-alike", "value")
     missed = [r for r in hidden if r["outcome"] not in good] + [r for r in (*outside, *nulls) if r["causes"]]
+    missed += [r for r in cluttered if r["outcome"] not in good or not all(is_in_arm(r, c) for c in r["causes"])]
     lines += ["", *(_line(r) for r in missed), *(f"case {r['number']}: {r['failed']}" for r in failed)]
     return "\n".join(lines).rstrip()
+
+
+def _calibration(records: list[Record]) -> list[str]:
+    """Return a line for each range of probabilities: number of names, how many of them are in the arm, and their mean probability."""
+    names = [(c["probability"], is_in_arm(r, c)) for r in records for c in r["causes"]]
+    lines = []
+    for low, high in itertools.pairwise(_RANGES):
+        of = [(p, right) for p, right in names if low <= p < high]
+        if of:
+            right = sum(right for _, right in of)
+            lines.append(
+                f"  {low:.2f} to {min(high, 1):.2f}: {right} of {len(of)}, mean {np.mean([p for p, _ in of]):.2f}"
+            )
+    return lines
 
 
 def _table(label: str, records: list[Record], group: Callable[[Record], Any]) -> list[str]:
@@ -165,7 +197,10 @@ def _line(r: Record) -> str:
     seen = f", {r['above_floor']:.1f} floors, {r['moved']:.1f} sigmas" if "visible" in r else ""
     made = f"{r['family']} {r['kinds']}, {1e3 * r['period']:g} ms, {r['controller']}, noise {100 * r['noise']:g} %"
     said = f"{r['verdict']} [{'; '.join(map(name, r['causes']))}] ({'; '.join(map(name, r['candidates']))})"
-    return f"case {r['number']}: {r['effect']}:{r['joint'] or ''} ({values}; {100 * r['change']:.0f} %{seen}; {made}) -> {r['outcome']}: {said}"
+    others = "".join(f" + {e['effect']}:{e['joint']}" for e in r["beside"])
+    laws = "".join(f" {law['variable']} on {law['joint']} {law['share']:.2f}" for law in r["unnamed"])
+    hidden = f"{r['effect']}:{r['joint'] or ''}{others} ({values}; {100 * r['change']:.0f} %{seen}; {made})"
+    return f"case {r['number']}: {hidden} -> {r['outcome']}: {said}{' unnamed' if laws else ''}{laws}"
 
 
 def _short(value: Any) -> str:

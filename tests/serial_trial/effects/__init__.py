@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from .arm import BaseTilt, NominalLink, Payload, RotorInertia
+from .clutter import Clutter
 from .drive import ActuatorDelay, ActuatorLag, TorqueDeadZone, TorqueGain, TorqueSaturation
 from .effect import TURN, Effect, Moment, Null, Use
 from .encoder import EncoderEccentricity, EncoderOffset
@@ -16,12 +17,26 @@ from .friction import (
     StribeckEverywhere,
     ViscousAsymmetry,
 )
-from .outside import CableSpring, LoadedCogging, TorqueDrift
+from .outside import (
+    BentDriveCurve,
+    CableSpring,
+    DampedCable,
+    DriveHysteresis,
+    FadingTorque,
+    FrictionJump,
+    FrictionOverTurns,
+    LoadedCogging,
+    NeighbourRipple,
+    ProductTorque,
+    SlewLimit,
+    SpeedRipple,
+    TorqueDrift,
+)
 from .several import CoupledTransmission, DelayEverywhere, LoadFrictionEverywhere
 from .torque import Contact, JointSpring, TorqueOffset, TorqueRipple
 from .transmission import Backlash, JointElasticity
 
-__all__ = ["EFFECTS", "TURN", "Effect", "Moment", "Null", "Use"]
+__all__ = ["BESIDE", "EFFECTS", "OUTSIDE", "TURN", "Clutter", "Effect", "Moment", "Null", "Use"]
 
 EFFECTS: dict[str, type[Effect]] = {
     effect.name: effect
@@ -34,3 +49,14 @@ EFFECTS: dict[str, type[Effect]] = {
     )
 }  # fmt: skip
 """Classes of all effects by name, without `Null`."""
+
+OUTSIDE: tuple[type[Effect], ...] = (
+    TorqueDrift, LoadedCogging, NeighbourRipple, FrictionJump, FrictionOverTurns, FadingTorque, DriveHysteresis, SlewLimit, SpeedRipple,
+    BentDriveCurve, DampedCable, ProductTorque,
+)  # fmt: skip
+"""Classes of the effects that armgap's library does not have."""
+BESIDE: tuple[type[Effect], ...] = (
+    Stribeck, CoulombAsymmetry, ViscousAsymmetry, QuadraticDrag, LoadDependentFriction, PositionDependentFriction, FrictionWarmup,
+    TorqueOffset, TorqueRipple, JointSpring, ActuatorLag, ActuatorDelay, TorqueDeadZone, TorqueGain, EncoderEccentricity, *OUTSIDE,
+)  # fmt: skip
+"""Classes of the effects that clutter is drawn from."""

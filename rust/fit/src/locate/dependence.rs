@@ -44,6 +44,19 @@ impl MotionVariable {
         }
     }
 
+    /// Joint whose position, velocity, acceleration or torque the variable is, from 0; `None` for the time.
+    pub fn joint(self) -> Option<usize> {
+        match self {
+            Self::Position(i)
+            | Self::Velocity(i)
+            | Self::Acceleration(i)
+            | Self::Torque(i)
+            | Self::Load(i)
+            | Self::Stop(i, _) => Some(i),
+            Self::Time => None,
+        }
+    }
+
     /// SI unit of the variable, for rotary or linear joints.
     pub fn unit(self, rotary: bool) -> &'static str {
         let [rotary_unit, linear_unit] = match self {

@@ -58,7 +58,7 @@ impl Classes {
 }
 
 /// Edges between classes: quantiles of the values; equal values fall into one class.
-fn edges(mut values: Vec<f64>) -> Vec<f64> {
+pub fn edges(mut values: Vec<f64>) -> Vec<f64> {
     values.sort_by(f64::total_cmp);
     let mut edges: Vec<f64> = (1..CLASSES).map(|k| values[k * values.len() / CLASSES]).collect();
     edges.dedup();

@@ -11,7 +11,8 @@ pub const SIGNIFICANT: f64 = 34.0;
 pub const NOTICED: f64 = 9.0;
 
 /// Decrease of the training cost (weighted squared residuals), per parameter of a term of the model, from which the term is accepted: twice the
-/// natural logarithm of the number of candidates, some 400.
+/// natural logarithm of the number of candidates, some 400. A table, whose classes are not chosen among candidates one by one, pays this once,
+/// and two more per class.
 pub const PRICE: f64 = 12.0;
 
 /// Number of standard deviations by which the size of a term of the model, estimated on the holdout, has to exceed zero: of 700 false terms that the
@@ -47,6 +48,16 @@ pub const ALIKE_COST: f64 = 4.0;
 
 /// Number of candidate terms, the best by first-order tests, that are fitted in each step of the model search.
 pub const TERM_FINALISTS: usize = 8;
+
+/// Number of tables of torque over one variable of the motion, the best by first-order tests, that are fitted as rivals of a cause.
+pub const RIVAL_FINALISTS: usize = 3;
+
+/// Largest number of laws without a name, tables over one variable each, that results list.
+pub const MOST_TABLES: usize = 3;
+
+/// Exponent, in the odds that a cause is no substitute for something else, of the squared holdout residuals that a table in the cause's place leaves, relative to those that the cause
+/// leaves; as for arms in a plane (`search::evidence`).
+pub const RIVAL_POWER: i32 = 4;
 
 /// Largest number of Gauss-Newton iterations in which the parameters of a model's terms are fitted; twelve iterations give the same diagnoses.
 pub const MAX_TERM_ITERATIONS: usize = 6;

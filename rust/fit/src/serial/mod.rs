@@ -16,6 +16,7 @@ mod weak_form;
 
 use crate::candidates::screen::effect_instances;
 use crate::likelihood::scale::Scales;
+use crate::locate::table_form::TableForm;
 use crate::log::input::{DiagnoseError, FEWEST_WINDOWS, LogData, Options, validate};
 use crate::log::track::{Reference, Track};
 use crate::model::chain::ChainDescription;
@@ -29,6 +30,7 @@ use controller::{PositionController, commanded};
 use search::{Motion, Search};
 use std::time::Instant;
 use term::controller_term::{ControllerTerm, Setting};
+use term::table::Table;
 use term::transmission::{Compliance, TransmissionLaw};
 use term::{Term, TermKind, row_term};
 use weak_form::equation::Equation;
@@ -107,6 +109,14 @@ impl<const N: usize, const P: usize> Motion for Equation<N, P> {
     fn signal(&self, term: &Term, theta: &[f64]) -> Signal {
         let theta = std::array::from_fn(|i| theta[i]);
         Equation::signal(self, term, &theta)
+    }
+
+    fn table_variable(&self, form: TableForm) -> Vec<[f64; 2]> {
+        Self::table_variable(self, form)
+    }
+
+    fn columns_of_table(&self, table: &Table) -> Vec<Signal> {
+        Self::columns_of_table(self, table)
     }
 
     fn inertia(&self, theta: &[f64]) -> Vec<f64> {

@@ -38,8 +38,8 @@ impl<const N: usize, const P: usize> Model<N, P> {
                 }
                 TermKind::BaseTilt => model.arm = turned(&model.arm, [term.p[0], term.p[1]]),
                 TermKind::Row(row) => model.rows.push((row, term.p)),
-                // Controllers are in the closed loop, and the members of a term on several joints are visited one by one.
-                TermKind::Controller(_) | TermKind::Joints(_) => {}
+                // Tables are compared with causes in the weak form only. Controllers are in the closed loop, and the members of a term on several joints are visited one by one.
+                TermKind::Controller(_) | TermKind::Joints(_) | TermKind::Table(_) => {}
             }
         }
         model

@@ -5,6 +5,7 @@ pub(in crate::serial) mod controller_report;
 
 use crate::locate::regimes::Location;
 use crate::log::input::Options;
+use crate::log::track::median;
 use crate::numeric::products::rms;
 use crate::numeric::random::Random;
 use crate::predict::window::Dataset;
@@ -12,9 +13,10 @@ use crate::progress::{Phase, ProgressReporter};
 use crate::result::gap::{HORIZONS, closed, free_run_series, limited, whole, window_series};
 use crate::result::report::{
     ArmSummary, AtHorizon, Candidate, Diagnosis, FreeRun, FreeRunSeries, Gap, LogSummary, Named, Noise,
-    OptionSummary, Parameters, Value,
+    OptionSummary, Parameters, TrainingErrors, Value,
 };
-use crate::result::verdict::Evidence;
+use crate::result::training_gap::remark;
+use crate::result::verdict::{Evidence, stands_out};
 use crate::serial::controller::closed_loop::ClosedLoop;
 use crate::serial::predict::{Model, floor};
 use crate::serial::result::cause_report::{cause, ruled_out};
@@ -54,9 +56,8 @@ pub(crate) fn assemble<const N: usize, const P: usize>(
     let rotary = description.rotary();
     let commanded = holdout.equation.commanded.as_ref().map(|commanded| &commanded.controller);
     let mut models = models(description, arm, holdout, found);
-    let noise: [f64; N] = std::array::from_fn(|j| {
-        crate::log::track::median(training.data.tracks.iter().map(|t| t.noise[j]).collect())
-    });
+    let noise: [f64; N] =
+        std::array::from_fn(|j| median(training.data.tracks.iter().map(|t| t.noise[j]).collect()));
     let data = &holdout.data;
     let mut predicted = [0, 1, 2].map(|i| {
         progress.unit();
@@ -68,11 +69,11 @@ pub(crate) fn assemble<const N: usize, const P: usize>(
     let contradicted = closed(&missed(1), &missed(2), &floor) < 0.0;
     let why_not =
         |n: &search::Named| n.unfit(&rotary).or_else(|| contradicted.then(|| PREDICTS_WORSE.to_owned()));
-    let (mut named, mut unnamed) = (Vec::new(), Vec::new());
+    let (mut named, mut candidates) = (Vec::new(), Vec::new());
     for n in &found.named {
         let cause = cause(n, &rotary, commanded);
         match why_not(n) {
-            Some(why) => unnamed.push(Candidate { cause, why }),
+            Some(why) => candidates.push(Candidate { cause, why }),
             None => named.push(cause),
         }
     }
@@ -82,11 +83,16 @@ pub(crate) fn assemble<const N: usize, const P: usize>(
         (models[2], predicted[2]) = (model, prediction);
     }
     let compared = Compared { models, predicted, measured, floor };
-    let gap = gap(&compared, data, &rotary, options);
+    let mut gap = gap(&compared, data, &rotary, options);
+    let [_, refit, with_causes] = self::models(description, arm, training, found);
+    let on_training = if contradicted { refit } else { with_causes };
+    gap.training = (!stands_out(&gap.after, &gap.floor, &gap.motion))
+        .then(|| training_gap(&training.data, &on_training))
+        .flatten();
     let evidence = Evidence {
         named: !named.is_empty(),
         open: false,
-        in_training: false,
+        in_training: gap.training.is_some(),
         before: &gap.before,
         refit: &gap.refit,
         after: &gap.after,
@@ -96,15 +102,16 @@ pub(crate) fn assemble<const N: usize, const P: usize>(
     let verdict = evidence.verdict();
     let parameters = |theta: &[f64], sigma: &[f64]| values(description, theta, sigma);
     let (free_run_series, free_run) = free_runs(&compared, data);
-    let mut gap = gap;
     gap.free_run = free_run;
+    let mut notes = notes(found, training, holdout, &rotary);
+    notes.extend(gap.training.as_ref().map(|errors| remark(errors, gap.unit)));
     Diagnosis {
         schema: "armgap.diagnosis/1",
         verdict,
         places: places(found, holdout),
         energy: Vec::new(),
         causes: named,
-        candidates: unnamed,
+        candidates,
         ruled_out: ruled_out(found, &unexplained(&found.model, holdout), &rotary),
         parameters: Parameters {
             nominal: parameters(&description.theta, &description.sigma),
@@ -118,7 +125,7 @@ pub(crate) fn assemble<const N: usize, const P: usize>(
         ranking: Vec::new(),
         stages: Vec::new(),
         regimes: Vec::new(),
-        unnamed: Vec::new(),
+        unnamed: found.unnamed.clone(),
         series: window_series(data, &compared.measured, compared.predicted.each_ref().map(Vec::as_slice)),
         free_run_series,
         noise: Noise {
@@ -134,7 +141,7 @@ pub(crate) fn assemble<const N: usize, const P: usize>(
         },
         version: env!("CARGO_PKG_VERSION"),
         seconds: 0.0,
-        notes: notes(found, training, holdout, &rotary),
+        notes,
         gap,
     }
 }
@@ -198,8 +205,6 @@ fn gap<const N: usize, const P: usize>(
     rotary: &[bool],
     options: &Options,
 ) -> Gap {
-    let still: Vec<f64> =
-        data.windows.iter().flat_map(|w| w.initial_state.q.as_slice().repeat(w.rows())).collect();
     let missed =
         |i: usize| rms::<N>(&compared.measured, &limited(&compared.measured, &compared.predicted[i]));
     let [before, refit, after] = [0, 1, 2].map(missed);
@@ -210,7 +215,7 @@ fn gap<const N: usize, const P: usize>(
         closed: closed(&before, &after, &floor),
         closed_ci: closed_interval(compared, data, options.seed),
         unexplained: (1.0 - closed(&refit, &after, &floor)).clamp(0.0, 1.0),
-        motion: rms::<N>(&compared.measured, &still),
+        motion: rms::<N>(&compared.measured, &still(data)),
         horizons: HORIZONS.iter().filter_map(|h| at_horizon(compared, data, *h)).collect(),
         free_run: FreeRun { before: Vec::new(), after: Vec::new() },
         second_halves: None,
@@ -220,6 +225,23 @@ fn gap<const N: usize, const P: usize>(
         after,
         floor,
     }
+}
+
+/// Errors of a model on the training logs; `None` where they are within noise or of no consequence in relation to the motion.
+fn training_gap<const N: usize, const P: usize>(
+    data: &Dataset<N>,
+    model: &Model<N, P>,
+) -> Option<TrainingErrors> {
+    let measured = data.measured();
+    let after = rms::<N>(&measured, &limited(&measured, &model.predict(data)));
+    let noise = std::array::from_fn(|j| median(data.tracks.iter().map(|t| t.noise[j]).collect()));
+    let floor: Vec<f64> = floor(data, &noise).iter().map(|v| v.sqrt()).collect();
+    stands_out(&after, &floor, &rms::<N>(&measured, &still(data))).then_some(TrainingErrors { after, floor })
+}
+
+/// Positions of the windows' first samples, rad or m, in place of predictions, sample by sample and joint by joint.
+fn still<const N: usize>(data: &Dataset<N>) -> Vec<f64> {
+    data.windows.iter().flat_map(|w| w.initial_state.q.as_slice().repeat(w.rows())).collect()
 }
 
 fn at_horizon<const N: usize, const P: usize>(

@@ -1,9 +1,10 @@
 //! Results of a model search: probabilities of the found terms, their look-alikes, and tests of the terms that are not in the model.
 
-use crate::serial::constants::{ALIKE, ALIKE_COST};
+use crate::serial::constants::{ALIKE, ALIKE_COST, RIVAL_POWER};
 use crate::serial::search::evidence::{consequence, stability, trust};
 use crate::serial::search::fitting::Fitted;
 use crate::serial::search::screening::Guess;
+use crate::serial::search::tables::{beside_rival, left_by_rival};
 use crate::serial::search::{Found, Named, Search, Tested};
 use crate::serial::term::Term;
 use crate::serial::weak_form::rows::{JointRows, Regression};
@@ -25,6 +26,7 @@ impl Search<'_> {
             (b.evidence.gain + b.evidence.holdout_gain)
                 .total_cmp(&(a.evidence.gain + a.evidence.holdout_gain))
         });
+        let unnamed = self.unnamed(regression, &model);
         let tested = self.tested(guesses, regression, &model);
         // Costs of the re-estimated and of the final model are comparable only under the same weights of the rows.
         let refit = if model.terms.is_empty() {
@@ -41,6 +43,7 @@ impl Search<'_> {
             refit_feasible,
             named,
             reported,
+            unnamed,
             tested,
             sigma: [refit_sigma, regression.sigma()],
             model,
@@ -102,11 +105,14 @@ impl Search<'_> {
         let (same, others): (Vec<Fitted>, Vec<Fitted>) = rivals.into_iter().partition(alike);
         let mut against: Vec<&Fitted> = others.iter().collect();
         against.push(&without);
+        let signal = self.training.signal(&term, &model.estimate.theta);
+        let acts_on: Vec<usize> = (0..self.rotary.len()).filter(|j| signal[*j].is_some()).collect();
         let wins = stability(model, &against, seed);
         let trust = trust(&without, model, &evidence, &self.floor(regression));
         let columns = self.derivatives(std::slice::from_ref(&term), &model.estimate.theta);
-        let sigma =
-            regression.score(&model.estimate, &columns, &self.ridge_of(&term, columns.len())).map_or_else(
+        let sigma = regression
+            .score(&model.estimate, &columns, &self.ridge_of(&term, columns.len(), regression))
+            .map_or_else(
                 || vec![f64::INFINITY; term.p.len()],
                 |score| {
                     let covariance = regression.sandwich(&model.estimate, &columns, &score);
@@ -123,7 +129,10 @@ impl Search<'_> {
                 alike.push(other.clone());
             }
         }
-        Named { term, sigma, evidence, probability: wins * trust, alike }
+        let rival = self.rival_table(regression, &without, &acts_on);
+        let left = rival.map_or(1.0, |rival| left_by_rival(model, &rival, &self.floor(regression), &acts_on));
+        let probability = wins * beside_rival(trust, left, RIVAL_POWER);
+        Named { term, sigma, evidence, probability, alike }
     }
 
     /// First-order tests, in addition to the terms of the model, of every candidate whose joint and effect are not in the model.

@@ -6,6 +6,8 @@ use crate::serial::constants::{
 };
 use crate::serial::search::Search;
 use crate::serial::search::fitting::Fitted;
+use crate::serial::search::tables::table_price;
+use crate::serial::term::TermKind;
 use crate::serial::weak_form::rows::{JointRows, Regression, Rows, Signal};
 
 /// Evidence for a term: comparison of the model with the term and the model without it.
@@ -13,6 +15,8 @@ use crate::serial::weak_form::rows::{JointRows, Regression, Rows, Signal};
 pub struct Evidence {
     /// Effective number of the term's parameters.
     pub parameters: f64,
+    /// Decrease of the training cost from which the term is accepted.
+    pub price: f64,
     /// Decrease, by the term, of the cost on the training logs: weighted squared residuals plus squared distance of the parameters from the arm
     /// file's values, counted in standard deviations.
     pub gain: f64,
@@ -36,7 +40,7 @@ impl Evidence {
     pub fn explains(&self) -> bool {
         self.statistic > NOTICED
             && self.statistic + self.deviations.max(0.0).powi(2) > SIGNIFICANT
-            && self.gain > PRICE * self.parameters
+            && self.gain > self.price
             && self.holdout_gain > 0.0
             && self.deviations > HOLDOUT_DEVIATIONS
             && self.share > MATTERS
@@ -87,6 +91,10 @@ impl Search<'_> {
         let holdout_gain = acts_on.iter().map(|j| cost(without, *j) - cost(with, *j)).sum();
         Evidence {
             parameters: term.degrees,
+            price: match term.kind {
+                TermKind::Table(ref table) => table_price(without.costs[0][table.joint].iter().sum(), term),
+                _ => PRICE * term.degrees,
+            },
             gain: without.estimate.cost - with.estimate.cost,
             relief: without.estimate.prior_cost - with.estimate.prior_cost,
             statistic,

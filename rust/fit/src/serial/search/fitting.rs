@@ -64,7 +64,9 @@ impl Search<'_> {
             }
             let theta = estimate.theta.clone();
             let columns = self.derivatives(&terms, &theta);
-            let Some(score) = regression.score(&estimate, &columns, &self.ridge(&terms)) else { break };
+            let Some(score) = regression.score(&estimate, &columns, &self.ridge(&terms, regression)) else {
+                break;
+            };
             let mut better = None;
             for part in [1.0, 0.5, 0.2, 0.05] {
                 let moved = self.moved(&terms, &score.size, part);
@@ -207,13 +209,19 @@ impl Search<'_> {
     }
 
     /// Prior precision (inverse variance) of each parameter of the terms, for parameters that motion does not determine.
-    pub(in crate::serial) fn ridge(&self, terms: &[Term]) -> Vec<f64> {
-        terms.iter().flat_map(|term| self.ridge_of(term, term.p.len())).collect()
+    pub(in crate::serial) fn ridge(&self, terms: &[Term], regression: &Regression) -> Vec<f64> {
+        terms.iter().flat_map(|term| self.ridge_of(term, term.p.len(), regression)).collect()
     }
 
     /// Prior precision (inverse variance) of the first `columns` parameters of a term: for a changed link from the arm file's standard deviations,
-    /// for parameters that are not estimated so large that they stay zero, else zero.
-    pub(in crate::serial) fn ridge_of(&self, term: &Term, columns: usize) -> Vec<f64> {
+    /// for parameters that are not estimated so large that they stay zero, for the torques of a table as if each class had one further row with a
+    /// typical factor and no torque, else zero.
+    pub(in crate::serial) fn ridge_of(
+        &self,
+        term: &Term,
+        columns: usize,
+        regression: &Regression,
+    ) -> Vec<f64> {
         match term.kind {
             TermKind::NominalLink(link) => {
                 let sigma = &self.prior.sigma[10 * link..];
@@ -221,6 +229,9 @@ impl Search<'_> {
             }
             TermKind::Row(RowTerm { law: RowLaw::Transmission(free), .. }) => {
                 free.iter().map(|free| if *free { 0.0 } else { HELD }).take(columns).collect()
+            }
+            TermKind::Table(ref table) => {
+                vec![(regression.weights[table.joint] * table.factor_square).max(f64::MIN_POSITIVE); columns]
             }
             _ => vec![0.0; columns],
         }

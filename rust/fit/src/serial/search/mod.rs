@@ -6,12 +6,16 @@ pub(in crate::serial) mod evidence;
 pub(in crate::serial) mod fitting;
 pub(in crate::serial) mod naming;
 pub(in crate::serial) mod screening;
+pub(in crate::serial) mod tables;
 
+use crate::locate::dependence::Dependence;
+use crate::locate::table_form::TableForm;
 use crate::progress::{Phase, ProgressReporter};
 use crate::serial::search::evidence::Evidence;
 use crate::serial::search::fitting::Fitted;
 use crate::serial::search::screening::Guess;
 use crate::serial::term::Term;
+use crate::serial::term::table::Table;
 use crate::serial::weak_form::rows::{Prior, Regression, Rows, Signal};
 
 /// Rows of an arm's weak equation of motion along a set of logs, and torques of terms along these logs.
@@ -20,6 +24,10 @@ pub trait Motion: Sync {
     fn rows(&self) -> &Rows;
     /// Torque of a term along the logs at the arm's parameters `theta`, by joint and row, N m or N.
     fn signal(&self, term: &Term, theta: &[f64]) -> Signal;
+    /// Factor and variable of a table's form in the middle of every sample interval, log after log.
+    fn table_variable(&self, form: TableForm) -> Vec<[f64; 2]>;
+    /// Torques of a table per unit of the torque of each class, by joint and row.
+    fn columns_of_table(&self, table: &Table) -> Vec<Signal>;
     /// Mean inertia of every joint along the logs at the arm's parameters `theta`, kg m^2 or kg.
     fn inertia(&self, theta: &[f64]) -> Vec<f64>;
 }
@@ -84,6 +92,8 @@ pub struct Found {
     pub named: Vec<Named>,
     /// The model with only those terms that are probable enough to be named, for predictions.
     pub reported: Fitted,
+    /// Laws without a name that explain what the final model leaves, those that explain most first.
+    pub unnamed: Vec<Dependence>,
     /// First-order tests, in addition to the terms of the final model, of all candidates that are not in this model.
     pub tested: Vec<Tested>,
     /// Standard deviations of the arm's parameters, SI: of the re-estimated model without terms, and of the final model.
@@ -167,6 +177,9 @@ impl Search<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::locate::dependence::MotionVariable;
+    use crate::locate::table_form::Factor;
+    use crate::locate::variable_classes::CLASSES;
     use crate::model::hypothesis::EffectInstance;
     use crate::numeric::random::Random;
     use crate::progress::{Control, Observer};
@@ -193,6 +206,10 @@ mod tests {
             // Each amplitude has a rate of its own; the second joint's torque is the first's times the row's factor.
             let wave = |k: usize| (1..=3).map(|i| term.p[i - 1] * (0.31 * (i * k) as f64).sin()).sum::<f64>();
             return [1.0, row.factor].map(|by| Some((0..ROWS).map(|k| by * wave(k)).collect())).into();
+        }
+        if let TermKind::Table(table) = &term.kind {
+            let torque = || (0..ROWS).map(|k| term.p[table.class(k as f64)]).collect();
+            return (0..2).map(|j| (j == table.joint).then(torque)).collect();
         }
         if term.is_on_several_joints() {
             return (0..2).map(|j| term.members().iter().find_map(|m| sine(m, phase)[j].clone())).collect();
@@ -232,6 +249,20 @@ mod tests {
 
         fn inertia(&self, _theta: &[f64]) -> Vec<f64> {
             vec![1.0; 2]
+        }
+
+        /// Row by row; only the time has values.
+        fn table_variable(&self, form: TableForm) -> Vec<[f64; 2]> {
+            let is_time = form == TableForm { factor: Factor::One, variable: MotionVariable::Time };
+            (0..if is_time { ROWS } else { 0 }).map(|k| [1.0, k as f64]).collect()
+        }
+
+        fn columns_of_table(&self, table: &Table) -> Vec<Signal> {
+            let column = |class: usize| -> Vec<f64> {
+                (0..ROWS).map(|k| f64::from(u8::from(table.class(k as f64) == class))).collect()
+            };
+            let of = |class: usize| (0..2).map(|j| (j == table.joint).then(|| column(class))).collect();
+            (0..CLASSES).map(of).collect()
         }
     }
 
@@ -369,6 +400,34 @@ mod tests {
         assert!((term.p[1] - 0.2).abs() < 0.01 && (term.p[2] - 0.4).abs() < 0.01, "{:?}", term.p);
     }
 
+    /// A torque on the second joint that depends on the time in a form that no candidate has.
+    fn drift() -> Term {
+        let form = TableForm { factor: Factor::One, variable: MotionVariable::Time };
+        let along: Vec<[f64; 2]> = (0..ROWS).map(|k| [1.0, k as f64]).collect();
+        let torques = (0..CLASSES).map(|c| if (c / 3).is_multiple_of(2) { 0.2 } else { -0.1 }).collect();
+        Table::new(1, form, &along).unwrap().term().with(torques)
+    }
+
+    #[test]
+    fn a_torque_that_no_candidate_explains_is_a_table() {
+        let found = found(&[drift()], 4);
+        assert!(names(&found).is_empty());
+        let [law] = &found.unnamed[..] else { panic!("{:?}", found.unnamed) };
+        assert_eq!((law.joint, law.variable.as_str(), law.law.x.len()), (2, "t", CLASSES));
+        assert!(law.share > 0.9, "{}", law.share);
+        for (torque, true_torque) in law.law.torque.iter().zip(drift().p) {
+            // The arm needs the term's torque, so the law is the opposite, less its mean.
+            assert!((law.law.constant[0] + torque + true_torque).abs() < 0.02, "{:?}", law.law);
+        }
+    }
+
+    #[test]
+    fn nothing_is_listed_where_nothing_or_only_a_named_effect_is_missing() {
+        assert!(found(&[], 4).unnamed.is_empty());
+        let found = found(&[law("quadratic_drag", 1, 0.6)], 4);
+        assert!(found.unnamed.is_empty() && found.named[0].probability > 0.9);
+    }
+
     #[test]
     fn a_delay_below_the_sample_period_is_not_named() {
         let period = 0.0025;
@@ -385,6 +444,7 @@ mod tests {
     fn acceptance_needs_every_part_of_the_evidence() {
         let good = Evidence {
             parameters: 1.0,
+            price: 12.0,
             gain: 100.0,
             relief: 0.0,
             statistic: 90.0,

@@ -92,7 +92,8 @@ impl Search<'_> {
         let term = &guess.term;
         let bounds = term.parameters(self.rotary_of(term));
         let within = |p: &[f64]| p.iter().zip(&bounds).all(|(p, b)| *p >= b.bounds[0] && *p <= b.bounds[1]);
-        let score = regression.score(at, &guess.columns, &self.ridge_of(term, guess.columns.len()))?;
+        let score =
+            regression.score(at, &guess.columns, &self.ridge_of(term, guess.columns.len(), regression))?;
         if let TermKind::Payload = term.kind {
             let mass = score.size[0];
             let p: Vec<f64> =
@@ -149,13 +150,25 @@ impl Search<'_> {
         let mut gain = (2.0 * score.size[0] - size) * size * information;
         let term = term.with(p);
         if term.changes_command()
-            && let Some(j) = term.joint().map(|j| j - 1)
+            && let Some(joint) = term.joint()
         {
-            let before = regression.weights[j] * at.residual[j].iter().map(|r| r * r).sum::<f64>();
-            gain = before
-                - (before - gain) * self.scales(self.training, std::slice::from_ref(&term), &at.theta)[j];
+            gain = self.scaled_gain(regression, at, &term, joint - 1, gain);
         }
         (gain > 0.0 && within(&term.p)).then_some((term, gain))
+    }
+
+    /// Decrease of the cost by a term on `joint` (from 0) that changes the command, from the decrease `gain` without regard to how much torque
+    /// reaches the joint ([`Search::scales`]).
+    pub(in crate::serial) fn scaled_gain(
+        &self,
+        regression: &Regression,
+        at: &Estimate,
+        term: &Term,
+        joint: usize,
+        gain: f64,
+    ) -> f64 {
+        let before = regression.weights[joint] * at.residual[joint].iter().map(|r| r * r).sum::<f64>();
+        before - (before - gain) * self.scales(self.training, std::slice::from_ref(term), &at.theta)[joint]
     }
 
     /// Torque of a term along the training logs per unit of one of its amplitudes, with its other amplitudes at their neutral values.

@@ -4,12 +4,15 @@
 pub(in crate::serial) mod controller_term;
 pub(in crate::serial) mod row_term;
 pub(in crate::serial) mod several_joints;
+pub(in crate::serial) mod table;
 pub(in crate::serial) mod transmission;
 
+use crate::locate::variable_classes::CLASSES;
 use crate::model::hypothesis::EffectInstance;
 use crate::serial::term::controller_term::{ControllerTerm, Setting};
 use crate::serial::term::row_term::{RowLaw, RowTerm};
 use crate::serial::term::several_joints::SeveralJoints;
+use crate::serial::term::table::Table;
 use crate::serial::term::transmission::TransmissionLaw;
 use armgap_core::chain::LINK_NAMES;
 use armgap_core::effect::{JointPoint, Quantity, Scope, Trial};
@@ -44,6 +47,8 @@ pub enum TermKind {
     Joints(SeveralJoints),
     /// A term that acts along the sum or the difference of two adjacent joints' positions.
     Row(RowTerm),
+    /// A torque without a name as a table over one variable of the motion; never a cause.
+    Table(Box<Table>),
 }
 
 /// Name, unit, bounds and neutral value of one parameter of a term.
@@ -62,6 +67,8 @@ pub struct TermParameter {
     pub inverse: Option<(&'static str, &'static str)>,
 }
 
+/// Torque of one class of a table.
+const CLASS: (&str, &str) = ("torque", "N m");
 const LOAD: [(&str, &str); 4] = [("mass", "kg"), ("com_x", "m"), ("com_y", "m"), ("com_z", "m")];
 const TURN: [(&str, &str); 2] = [("x", "rad"), ("y", "rad")];
 
@@ -82,6 +89,7 @@ impl Term {
             TermKind::Transmission(_) | TermKind::Controller(_) => 1,
             TermKind::Joints(ref of) => of.members.iter().map(|m| m.p.len()).sum(),
             TermKind::Row(row) => row.len(),
+            TermKind::Table(_) => CLASSES,
         };
         Self { kind, p: vec![0.0; count], degrees: count as f64 }
     }
@@ -97,6 +105,7 @@ impl Term {
             TermKind::Controller(of) => of.setting.name(),
             TermKind::Joints(ref of) => of.members[0].name(),
             TermKind::Row(row) => row.name(),
+            TermKind::Table(_) => "unnamed",
         }
     }
 
@@ -111,6 +120,7 @@ impl Term {
             TermKind::Controller(of) => of.setting.title(),
             TermKind::Joints(ref of) => of.members[0].title(),
             TermKind::Row(row) => row.title(),
+            TermKind::Table(_) => "torque without a name",
         }
     }
 
@@ -121,6 +131,7 @@ impl Term {
             TermKind::NominalLink(link) => Some(link + 1),
             TermKind::Transmission(law) => Some(law.joint + 1),
             TermKind::Controller(of) => Some(of.joint + 1),
+            TermKind::Table(ref table) => Some(table.joint + 1),
             TermKind::Payload | TermKind::BaseTilt | TermKind::Joints(_) | TermKind::Row(_) => None,
         }
     }
@@ -194,6 +205,7 @@ impl Term {
                 of.members[..different].iter().flat_map(|m| m.parameters(rotary)).collect()
             }
             TermKind::Row(row) => row.parameters(rotary),
+            TermKind::Table(_) => [CLASS; CLASSES].iter().map(free).collect(),
         }
     }
 
@@ -217,6 +229,7 @@ impl Term {
             TermKind::Joints(ref of) => of.members[0].amplitudes(),
             TermKind::Row(RowTerm { law: RowLaw::Transmission(_), .. }) => 3,
             TermKind::Transmission(_) | TermKind::Row(_) => 1,
+            TermKind::Table(_) => CLASSES,
         }
     }
 
@@ -229,7 +242,8 @@ impl Term {
             | TermKind::BaseTilt
             | TermKind::NominalLink(_)
             | TermKind::Joints(_)
-            | TermKind::Row(_) => false,
+            | TermKind::Row(_)
+            | TermKind::Table(_) => false,
         }
     }
 
@@ -237,6 +251,9 @@ impl Term {
     pub fn changes_command(&self) -> bool {
         if let TermKind::Joints(of) = &self.kind {
             return of.members[0].changes_command();
+        }
+        if let TermKind::Table(table) = &self.kind {
+            return table.changes_command();
         }
         let TermKind::Law(effect) = self.kind else { return self.share_of_command().is_some() };
         effect.law.spec().hooks.command || depends(&effect, |x, value| x.tau = value)

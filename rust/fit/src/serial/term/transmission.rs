@@ -137,15 +137,17 @@ impl<const N: usize, const P: usize> Equation<N, P> {
             .logs()
             .iter()
             .map(|log| {
-                let of = |m: &Middle<N>| {
-                    let torque = if law.encoder_at_motor {
-                        self.motor_torque(m, j, theta)
-                    } else {
-                        self.link_torque(m, &links)[j]
-                    };
-                    law.compliance.deflection(torque)
+                let middles = &log.middles;
+                let mut torques: Vec<f64> = if law.encoder_at_motor {
+                    middles.par_iter().map(|m| self.motor_torque(m, j, theta)).collect()
+                } else {
+                    middles.par_iter().map(|m| self.link_torque(m, &links)[j]).collect()
                 };
-                with_rates(&log.middles, &log.middles.par_iter().map(of).collect::<Vec<f64>>())
+                if law.encoder_at_motor {
+                    bridge_rest(middles, j, &mut torques);
+                }
+                let of = |torque: &f64| law.compliance.deflection(*torque);
+                with_rates(middles, &torques.iter().map(of).collect::<Vec<f64>>())
             })
             .collect();
         if law.encoder_at_motor {
@@ -254,6 +256,33 @@ impl<const P: usize> Computed<P> {
     }
 }
 
+/// Replaces the torques that the motor of joint `j` passes on while it is at rest by linear interpolation in time between those before and after: the
+/// friction of a motor at rest is unknown, and the shaft's torque is continuous. Where a log begins or ends at rest the nearest torque is held.
+fn bridge_rest<const N: usize>(middles: &[Middle<N>], j: usize, torques: &mut [f64]) {
+    let mut before: Option<usize> = None;
+    let mut k = 0;
+    while k < middles.len() {
+        if !middles[k].rest[j] {
+            before = Some(k);
+            k += 1;
+            continue;
+        }
+        let after = (k..middles.len()).find(|i| !middles[*i].rest[j]);
+        let end = after.unwrap_or(middles.len());
+        for i in k..end {
+            torques[i] = match (before, after) {
+                (Some(a), Some(b)) => {
+                    let part = (middles[i].t - middles[a].t) / (middles[b].t - middles[a].t);
+                    torques[a] + part * (torques[b] - torques[a])
+                }
+                (Some(one), None) | (None, Some(one)) => torques[one],
+                (None, None) => torques[i],
+            };
+        }
+        k = end;
+    }
+}
+
 /// Deflections of a transmission at the middles of sample intervals, each with its rate from central differences.
 fn with_rates<const N: usize>(middles: &[Middle<N>], deflections: &[f64]) -> Vec<[f64; 2]> {
     let last = deflections.len().saturating_sub(1);
@@ -264,4 +293,39 @@ fn with_rates<const N: usize>(middles: &[Middle<N>], deflections: &[f64]) -> Vec
         [deflections[k], rate]
     };
     (0..deflections.len()).map(at).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn middles(rest: &[bool]) -> Vec<Middle<1>> {
+        let middle = |(k, rest): (usize, &bool)| Middle {
+            t: 0.01 * k as f64,
+            h: 0.01,
+            q: [0.0],
+            dq: [0.0],
+            ddq: [0.0],
+            mean_dq: [0.0],
+            tau: [0.0],
+            rest: [*rest],
+        };
+        rest.iter().enumerate().map(middle).collect()
+    }
+
+    #[test]
+    fn torques_of_a_motor_at_rest_lie_between_those_before_and_after() {
+        let rest = [true, false, true, true, true, false, false, true];
+        let mut torques = [9.0, 1.0, 9.0, -9.0, 9.0, 5.0, 4.0, -9.0];
+        bridge_rest(&middles(&rest), 0, &mut torques);
+        let expected = [1.0, 1.0, 2.0, 3.0, 4.0, 5.0, 4.0, 4.0];
+        assert!(torques.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{torques:?}");
+    }
+
+    #[test]
+    fn a_motor_that_never_moves_keeps_its_torques() {
+        let mut torques = [1.0, -2.0];
+        bridge_rest(&middles(&[true; 2]), 0, &mut torques);
+        assert_eq!(torques, [1.0, -2.0]);
+    }
 }

@@ -210,6 +210,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
             TermKind::Transmission(law) => self.of_transmission(&law, term.p[0], theta),
             TermKind::Controller(setting) => self.of_controller(setting, term.p[0]),
             TermKind::Row(row) => self.of_row(&row, &term.p),
+            TermKind::Table(ref table) => self.of_table(table, &term.p),
             TermKind::Joints(_) => {
                 let members = term.members();
                 sum(&self.rows, &members.iter().map(|m| self.signal_with_mean(m, theta)).collect::<Vec<_>>())

@@ -62,6 +62,8 @@ pub struct Intervals<const N: usize> {
     pub middles: Vec<Middle<N>>,
     /// Standard deviation of the position noise by joint, rad or m.
     pub noise: [f64; N],
+    /// Speeds below which the joints count as at rest whatever their noise, rad/s or m/s.
+    pub slow: [f64; N],
 }
 
 impl<const N: usize> Intervals<N> {
@@ -91,7 +93,7 @@ impl<const N: usize> Intervals<N> {
                 }),
             }
         };
-        Self { middles: (0..track.len().saturating_sub(1)).map(middle).collect(), noise: track.noise }
+        Self { middles: (0..track.len().saturating_sub(1)).map(middle).collect(), noise: track.noise, slow }
     }
 
     /// Test functions over the log, each of `half_width`, s, or wider where the log has few samples; `log` is the index of the log.

@@ -1,6 +1,6 @@
 //! Regression of the weak form's rows, joint by joint, on the arm's parameters, given the torques of further terms.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 /// Largest lag, in rows, over which residuals count as correlated, a quarter of a second: disturbances are correlated over 0.05 to 0.3 s, and a
 /// longer correlation comes from torques that are missing in the model.
@@ -141,6 +141,8 @@ pub struct Regression<'a> {
     pub weights: Vec<f64>,
     /// Normal matrix `Psi' W Psi` of the data, without the prior.
     normal: DMatrix<f64>,
+    /// Cholesky factor of the normal matrix plus the prior's precision, with only the [`Self::fixed`] parameters held; `None` if singular.
+    free: Option<Cholesky<f64, Dyn>>,
 }
 
 /// Parameters estimated by a regression in which a given torque is added to that of the parameters.
@@ -165,7 +167,9 @@ impl<'a> Regression<'a> {
             let psi = DMatrix::from_row_slice(joint.y.len(), p, &joint.psi);
             normal += *weight * psi.tr_mul(&psi);
         }
-        Self { rows, prior, weights, normal }
+        let mut regression = Self { rows, prior, weights, normal, free: None };
+        regression.free = regression.system(&regression.fixed());
+        regression
     }
 
     /// A regression whose weights follow from the residuals of an estimate with the torque `beside` added to that of the parameters.
@@ -207,7 +211,7 @@ impl<'a> Regression<'a> {
 
     /// Cholesky factor of the normal matrix plus the prior's precision, with the rows and columns of `held` parameters replaced by the identity;
     /// `None` if the matrix is not positive definite.
-    fn system(&self, held: &[bool]) -> Option<nalgebra::Cholesky<f64, nalgebra::Dyn>> {
+    fn system(&self, held: &[bool]) -> Option<Cholesky<f64, Dyn>> {
         let mut system = self.normal.clone();
         let p = self.rows.parameters;
         for i in 0..p {
@@ -285,7 +289,7 @@ impl<'a> Regression<'a> {
     pub fn score(&self, at: &Estimate, columns: &[Signal], ridge: &[f64]) -> Option<Score> {
         let k = columns.len();
         let fixed = self.fixed();
-        let system = self.system(&fixed)?;
+        let system = self.free.as_ref()?;
         // Parameters that are not estimated cannot take over a part of the torque.
         let estimated = |mut along: DVector<f64>| {
             along.iter_mut().zip(&fixed).filter(|(_, fixed)| **fixed).for_each(|(x, _)| *x = 0.0);
@@ -334,7 +338,7 @@ impl<'a> Regression<'a> {
     /// prior.
     pub fn sigma(&self) -> Vec<f64> {
         let fixed = self.fixed();
-        let inverse = self.system(&fixed).map(|s| s.inverse());
+        let inverse = self.free.as_ref().map(Cholesky::inverse);
         (0..self.rows.parameters)
             .map(|i| match &inverse {
                 Some(inverse) if !fixed[i] => inverse[(i, i)].max(0.0).sqrt(),
