@@ -157,9 +157,15 @@ impl Request<'_> {
         };
         training.equation.regularise(&widths);
         holdout.equation.regularise(&widths);
-        let least = constants::CONDITIONED * training.equation.conditioning(&theta).max(0.0);
-        let is_feasible =
-            |values: &[f64]| training.equation.conditioning(&std::array::from_fn(|i| values[i])) > least;
+        let is_feasible = |values: &[f64], apart: &[usize]| {
+            // A motor with a position of its own leaves the links without its inertia.
+            let conditioning = |values: &[f64]| {
+                let is_apart = |i: usize| i >= 10 * N && apart.contains(&(i - 10 * N));
+                let links = std::array::from_fn(|i| if is_apart(i) { 0.0 } else { values[i] });
+                training.equation.conditioning(&links)
+            };
+            conditioning(values) > constants::CONDITIONED * conditioning(&theta).max(0.0)
+        };
         let mut candidates = candidates(&arm, &theta, &training.data.tracks, self.options.known_units);
         if let Some(controller) = &controller {
             // Position noise limits the accuracy of a controller's torque, and so of a deflection computed from this torque.

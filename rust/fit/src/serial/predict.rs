@@ -29,17 +29,22 @@ impl<const N: usize, const P: usize> Model<N, P> {
                 TermKind::Law(_) => model.hypothesis.effects.extend(term.effect()),
                 TermKind::Payload => model.add(N - 1, &of_load(&term.p)),
                 TermKind::NominalLink(link) => model.add(link, &std::array::from_fn(|i| term.p[i])),
-                TermKind::Transmission(law) => {
+                // A shaft that does not twist is a rigid joint.
+                TermKind::Transmission(law) if term.p[0] > 0.0 => {
                     let j = law.joint;
                     let inertia = arm.inertia(&theta, &SVector::zeros())[(j, j)];
-                    let (effect, taken) = law.instance(term.p[0], theta[10 * N + j], inertia);
+                    let (effect, taken) = law.instance(&term.p, theta[10 * N + j], inertia);
                     model.hypothesis.theta[10 * N + j] -= taken;
                     model.hypothesis.effects.push(effect);
                 }
                 TermKind::BaseTilt => model.arm = turned(&model.arm, [term.p[0], term.p[1]]),
                 TermKind::Row(row) => model.rows.push((row, term.p)),
-                // Tables are compared with causes in the weak form only. Controllers are in the closed loop, and the members of a term on several joints are visited one by one.
-                TermKind::Controller(_) | TermKind::Joints(_) | TermKind::Table(_) => {}
+                // Tables are compared with causes in the weak form only, controllers are in the closed loop, and the members of a term on several joints
+                // are visited one by one.
+                TermKind::Controller(_)
+                | TermKind::Joints(_)
+                | TermKind::Table(_)
+                | TermKind::Transmission(_) => {}
             }
         }
         model

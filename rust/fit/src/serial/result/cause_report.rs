@@ -7,6 +7,7 @@ use crate::serial::constants::{CONSEQUENCE, NOTICED, SIGNIFICANT};
 use crate::serial::controller::PositionController;
 use crate::serial::result::controller_report::behind_controller;
 use crate::serial::search::{Found, Tested};
+use crate::serial::term::transmission::TransmissionLaw;
 use crate::serial::term::{Term, TermKind};
 use armgap_core::effect::{Effect, Scope, Trial, catalogue};
 
@@ -67,7 +68,15 @@ fn named_values(term: &Term, sigma: &[f64], rotary: &[bool]) -> Named<Value> {
             _ => (p.name.to_owned(), Value { value: term.p[i], sigma, unit: p.unit }),
         }
     };
-    parameters.iter().enumerate().map(value).collect()
+    let mut values: Named<Value> = parameters.iter().enumerate().map(value).collect();
+    if let TermKind::Transmission(_) = term.kind
+        && let Some([damping, sigma]) = TransmissionLaw::damping(&term.p, sigma)
+    {
+        let unit = if rotary_of(term, rotary) { "N m s/rad" } else { "N s/m" };
+        values.remove("lag");
+        values.insert("damping".to_owned(), Value { value: damping, sigma, unit });
+    }
+    values
 }
 
 pub(in crate::serial) fn cause(

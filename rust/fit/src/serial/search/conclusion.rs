@@ -53,7 +53,8 @@ impl Search<'_> {
     /// The model with its links' parameters moved towards the arm file's until the inertia matrix is well conditioned ([`Search::is_feasible`]), and
     /// with rotor inertias and friction estimated again.
     fn feasible(&self, regression: &Regression, model: Fitted) -> Fitted {
-        if (self.is_feasible)(&model.estimate.theta) {
+        let apart: Vec<usize> = model.terms.iter().filter_map(Term::own_motor).collect();
+        if (self.is_feasible)(&model.estimate.theta, &apart) {
             return model;
         }
         let links = LINK_PARAMETERS * self.rotary.len();
@@ -66,7 +67,7 @@ impl Search<'_> {
             }
             let near = Regression::new(self.training.rows(), &prior, regression.weights.clone());
             let fitted = self.fit(&near, model.terms.clone(), &prior.theta);
-            if (self.is_feasible)(&fitted.estimate.theta) {
+            if (self.is_feasible)(&fitted.estimate.theta, &apart) {
                 return fitted;
             }
         }

@@ -109,7 +109,16 @@ impl Search<'_> {
                 let (k, preload) = (score.size[0], score.size[1]);
                 return (k != 0.0).then(|| (term.with(vec![k, -preload / k]), score.gain));
             }
-            TermKind::Row(row) => return test_row(regression, at, guess, row),
+            TermKind::Row(row) => {
+                let (free, p, gain) = test_positive(regression, at, guess)?;
+                let law = RowLaw::Transmission(std::array::from_fn(|i| free.contains(&i)));
+                let kind = TermKind::Row(RowTerm { law, ..row });
+                return Some((Term { kind, p, degrees: free.len() as f64 }, gain));
+            }
+            TermKind::Transmission(_) => {
+                let (_, p, gain) = test_positive(regression, at, guess)?;
+                return (p[0] > 0.0).then(|| (term.with(p), gain));
+            }
             _ => {}
         }
         let count = term.amplitudes();
@@ -228,9 +237,13 @@ impl Search<'_> {
     }
 }
 
-/// First-order test of the inertia and friction of a transmission that couples two joints, with parameters that would be negative set to zero;
-/// returns the term with the values that the test suggests, and by how much these values lower the cost.
-fn test_row(regression: &Regression, at: &Estimate, guess: &Guess, row: RowTerm) -> Option<(Term, f64)> {
+/// First-order test of a term none of whose amplitudes may be negative: indices of those that are not held at zero, the amplitudes that the test
+/// suggests, and by how much they lower the cost; `None` where all of them would be negative.
+fn test_positive(
+    regression: &Regression,
+    at: &Estimate,
+    guess: &Guess,
+) -> Option<(Vec<usize>, Vec<f64>, f64)> {
     let mut free: Vec<usize> = (0..guess.columns.len()).collect();
     loop {
         let columns: Vec<Signal> = free.iter().map(|i| guess.columns[*i].clone()).collect();
@@ -242,8 +255,6 @@ fn test_row(regression: &Regression, at: &Estimate, guess: &Guess, row: RowTerm)
         }
         let mut p = vec![0.0; guess.columns.len()];
         free.iter().zip(&score.size).for_each(|(i, size)| p[*i] = *size);
-        let law = RowLaw::Transmission(std::array::from_fn(|i| free.contains(&i)));
-        let kind = TermKind::Row(RowTerm { law, ..row });
-        return Some((Term { kind, p, degrees: free.len() as f64 }, score.gain));
+        return Some((free, p, score.gain));
     }
 }

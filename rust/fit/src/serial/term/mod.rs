@@ -39,7 +39,8 @@ pub enum TermKind {
     BaseTilt,
     /// Difference of a link's mass, first moments and inertia from the nominal values; the number is the link's 0-based index.
     NominalLink(usize),
-    /// Joint elasticity or backlash of a transmission; the parameter is the compliance, rad/(N m) (m/N), or the gap, rad (m).
+    /// Joint elasticity or backlash of a transmission; parameters are the compliance, rad/(N m) (m/N), and the lag, rad s/(N m) (m s/N), or the gap,
+    /// rad (m).
     Transmission(TransmissionLaw),
     /// A setting of a joint's position controller that differs from the arm file.
     Controller(ControllerTerm),
@@ -86,7 +87,8 @@ impl Term {
             TermKind::Payload => LOAD.len(),
             TermKind::BaseTilt => TURN.len(),
             TermKind::NominalLink(_) => LINK_NAMES.len(),
-            TermKind::Transmission(_) | TermKind::Controller(_) => 1,
+            TermKind::Transmission(law) => law.parameters(true).len(),
+            TermKind::Controller(_) => 1,
             TermKind::Joints(ref of) => of.members.iter().map(|m| m.p.len()).sum(),
             TermKind::Row(row) => row.len(),
             TermKind::Table(_) => CLASSES,
@@ -134,6 +136,11 @@ impl Term {
             TermKind::Table(ref table) => Some(table.joint + 1),
             TermKind::Payload | TermKind::BaseTilt | TermKind::Joints(_) | TermKind::Row(_) => None,
         }
+    }
+
+    /// Joint (from 0) whose motor has a position of its own by the term, as behind an elastic shaft or backlash.
+    pub fn own_motor(&self) -> Option<usize> {
+        if let TermKind::Transmission(law) = self.kind { Some(law.joint) } else { None }
     }
 
     /// Factors (1 and 1, or 1 and -1) of two adjacent joints' positions in the sum or difference that the term acts along; `None` for terms of other
@@ -198,7 +205,7 @@ impl Term {
             }
             TermKind::BaseTilt => TURN.iter().map(free).collect(),
             TermKind::NominalLink(_) => LINK_NAMES.iter().map(free).collect(),
-            TermKind::Transmission(law) => vec![law.parameter(rotary)],
+            TermKind::Transmission(law) => law.parameters(rotary),
             TermKind::Controller(of) => vec![of.setting.parameter(rotary)],
             TermKind::Joints(ref of) => {
                 let different = if of.common { 1 } else { of.members.len() };
@@ -228,7 +235,8 @@ impl Term {
             TermKind::NominalLink(_) => LINK_NAMES.len(),
             TermKind::Joints(ref of) => of.members[0].amplitudes(),
             TermKind::Row(RowTerm { law: RowLaw::Transmission(_), .. }) => 3,
-            TermKind::Transmission(_) | TermKind::Row(_) => 1,
+            TermKind::Transmission(law) => law.parameters(true).len(),
+            TermKind::Row(_) => 1,
             TermKind::Table(_) => CLASSES,
         }
     }

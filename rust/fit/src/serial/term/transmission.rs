@@ -1,16 +1,17 @@
 //! Joint elasticity and backlash in the weak form: how a deflection between motor and link changes the equation of motion.
 //!
-//! The deflection between motor and link follows from the torque `T` that the transmission passes on: `T / stiffness` for an elastic shaft (Spong
-//! 1987, without the damping), and, for backlash, half the gap towards the side that `T` pushes to (Nordin and Gutman 2002). Where the encoder
+//! The deflection between motor and link follows from the torque `T` that the transmission passes on: for an elastic shaft (Spong 1987), whose spring
+//! and damper act side by side, `T / stiffness` delayed by the ratio of damping and stiffness, to first order in this time; for backlash, half the gap towards the side that `T` pushes to (Nordin and Gutman 2002). Where the encoder
 //! measures the motor, `T` is the motor's torque less those of rotor inertia and friction, and the link's position is the motor's less the
 //! deflection; where the encoder measures the link, `T` is the torque of the links, and the motor's position, at which rotor inertia and friction
-//! act, is the link's plus the deflection.
+//! act, is the link's plus the deflection. `T` is unknown while the motor is at rest, since its dry friction is: it is interpolated there, as the
+//! deflection is continuous.
 
 use crate::model::hypothesis::EffectInstance;
 use crate::serial::term::TermParameter;
 use crate::serial::weak_form::equation::Equation;
-use crate::serial::weak_form::intervals::Middle;
-use crate::serial::weak_form::rows::Signal;
+use crate::serial::weak_form::intervals::{Intervals, Middle};
+use crate::serial::weak_form::rows::{Signal, sum};
 use armgap_core::arm::Arm;
 use armgap_core::effect::{Effect, find};
 use armgap_core::kinematics::JointState;
@@ -38,7 +39,8 @@ pub struct TransmissionLaw {
 /// Law of a transmission's deflection between motor and link under the transmitted torque.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Compliance {
-    /// Elastic shaft: the deflection is in proportion to the transmitted torque.
+    /// Elastic shaft: the deflection is `compliance T - lag dT/dt`, with the compliance the inverse stiffness and the lag the damping over the squared
+    /// stiffness.
     Elastic,
     /// Backlash: the deflection is half the gap, to the side that the torque pushes to; the value is the torque around zero within which the link
     /// crosses the gap, N m (N).
@@ -46,7 +48,7 @@ pub enum Compliance {
 }
 
 impl Compliance {
-    /// Deflection between motor and link under a transmitted torque, N m (N), per unit of the compliance or of the gap.
+    /// Deflection between motor and link under a constant transmitted torque, N m (N), per unit of the compliance or of the gap.
     fn deflection(self, torque: f64) -> f64 {
         match self {
             Self::Elastic => torque,
@@ -55,8 +57,12 @@ impl Compliance {
     }
 }
 
-/// Damping ratio that predictions assume for an elastic joint; motion slower than the joint's oscillation does not determine the damping.
-const DAMPING: f64 = 0.1;
+/// Least and largest damping ratio of an elastic joint's oscillation in predictions: beyond them the estimate is taken as uncertain.
+const DAMPING: [f64; 2] = [0.02, 1.0];
+
+/// Half width of the raised cosine with which the transmitted torque is low-passed, s: it takes out noise of the acceleration of a motor, and passes
+/// oscillations of a joint up to 15 Hz.
+const LOW_PASS_S: f64 = 0.02;
 
 /// Rotor inertia that predictions assume for a motor without one in the arm file, relative to the joint's inertia.
 const ROTOR_SHARE: f64 = 0.03;
@@ -81,25 +87,44 @@ impl TransmissionLaw {
         self.effect().spec().title
     }
 
-    /// Name, unit and bounds of the estimated parameter, compliance or gap; `rotary` is whether the joint is rotary.
-    pub fn parameter(&self, rotary: bool) -> TermParameter {
-        let (name, unit, inverse) = match (self.compliance, rotary) {
-            (Compliance::Elastic, true) => ("compliance", "rad/(N m)", Some(("stiffness", "N m/rad"))),
-            (Compliance::Elastic, false) => ("compliance", "m/N", Some(("stiffness", "N/m"))),
-            (Compliance::Backlash(_), true) => ("gap", "rad", None),
-            (Compliance::Backlash(_), false) => ("gap", "m", None),
+    /// Names, units and bounds of the estimated parameters, compliance and lag or gap; `rotary` is whether the joint is rotary.
+    pub fn parameters(&self, rotary: bool) -> Vec<TermParameter> {
+        let of = |name, units: [&'static str; 2], inverse: Option<(&'static str, [&'static str; 2])>| {
+            let unit = |units: [&'static str; 2]| if rotary { units[0] } else { units[1] };
+            let inverse = inverse.map(|(name, units)| (name, unit(units)));
+            TermParameter { name, unit: unit(units), bounds: [0.0, f64::INFINITY], neutral: 0.0, inverse }
         };
-        TermParameter { name, unit, bounds: [0.0, f64::INFINITY], neutral: 0.0, inverse }
+        match self.compliance {
+            Compliance::Elastic => vec![
+                of("compliance", ["rad/(N m)", "m/N"], Some(("stiffness", ["N m/rad", "N/m"]))),
+                of("lag", ["rad s/(N m)", "m s/N"], None),
+            ],
+            Compliance::Backlash(_) => vec![of("gap", ["rad", "m"], None)],
+        }
     }
 
-    /// The effect that simulates a compliance, rad/(N m) (m/N), or a gap, rad (m), of `size`, and the part of the arm file's rotor inertia that the
+    /// Damping, N m s/rad (N s/m), of a transmission with the parameters `p`, and the damping's standard deviation from those of the parameters,
+    /// `sigma`; `None` for backlash, or without a compliance.
+    pub fn damping(p: &[f64], sigma: &[f64]) -> Option<[f64; 2]> {
+        let (compliance, lag) = (*p.first()?, *p.get(1)?);
+        let damping = lag / (compliance * compliance);
+        let own = sigma.get(1).copied().unwrap_or(0.0) / (compliance * compliance);
+        let scaled = 2.0 * damping * sigma.first().copied().unwrap_or(0.0) / compliance;
+        damping.is_finite().then(|| [damping, own.hypot(scaled)])
+    }
+
+    /// The effect that simulates a transmission with the parameters `p` of [`Self::parameters`], and the part of the arm file's rotor inertia that the
     /// effect takes over; `rotor` is that rotor inertia and `inertia` the joint's inertia, kg m^2 (kg).
-    pub fn instance(&self, size: f64, rotor: f64, inertia: f64) -> (EffectInstance, f64) {
+    pub fn instance(&self, p: &[f64], rotor: f64, inertia: f64) -> (EffectInstance, f64) {
+        let size = p[0];
         let rotor_inertia = if rotor > 0.0 { rotor } else { ROTOR_SHARE * inertia };
         let (p, taken) = match self.compliance {
             Compliance::Elastic => {
                 let stiffness = 1.0 / size.max(f64::MIN_POSITIVE);
-                ([stiffness, 2.0 * DAMPING * (stiffness * rotor_inertia).sqrt(), rotor_inertia], rotor)
+                let ratio =
+                    0.5 * Self::damping(p, &[]).map_or(0.0, |d| d[0]) / (stiffness * rotor_inertia).sqrt();
+                let damping = 2.0 * ratio.clamp(DAMPING[0], DAMPING[1]) * (stiffness * rotor_inertia).sqrt();
+                ([stiffness, damping, rotor_inertia], rotor)
             }
             Compliance::Backlash(_) => ([size, (rotor_inertia / inertia).clamp(0.005, 0.35), 0.0], 0.0),
         };
@@ -113,23 +138,26 @@ impl TransmissionLaw {
 }
 
 impl<const N: usize, const P: usize> Equation<N, P> {
-    /// Torque by joint and row of the weak form, N m or N, due to the deflection of a transmission with a compliance, rad/(N m) (m/N), or a gap, rad
-    /// (m), of `size`: to first order, so in proportion to `size`.
+    /// Torque by joint and row of the weak form, N m or N, due to the deflection of a transmission with the parameters `p` of
+    /// [`TransmissionLaw::parameters`]: to first order, so in proportion to each of them.
     pub(in crate::serial) fn of_transmission(
         &self,
         law: &TransmissionLaw,
-        size: f64,
+        p: &[f64],
         theta: &[f64; P],
     ) -> Signal {
-        if size == 0.0 {
+        if p.iter().all(|p| *p == 0.0) {
             return vec![None; N];
         }
-        let unit = self.computed.of(law, theta, || self.of_unit(law, theta));
-        unit.iter().map(|s| s.as_ref().map(|s| s.iter().map(|x| size * x).collect())).collect()
+        let units = self.computed.of(law, theta, || self.of_units(law, theta));
+        let scaled = |(unit, p): (&Signal, &f64)| -> Signal {
+            unit.iter().map(|s| s.as_ref().map(|s| s.iter().map(|x| p * x).collect())).collect()
+        };
+        sum(&self.rows, &units.iter().zip(p).map(scaled).collect::<Vec<Signal>>())
     }
 
-    /// Torque by joint and row of the weak form due to the deflection of a transmission, to first order, per unit of compliance or gap.
-    fn of_unit(&self, law: &TransmissionLaw, theta: &[f64; P]) -> Signal {
+    /// Torques by joint and row of the weak form due to the deflection of a transmission, to first order, per unit of each of its parameters.
+    fn of_units(&self, law: &TransmissionLaw, theta: &[f64; P]) -> Vec<Signal> {
         let j = law.joint;
         let mut links = *theta;
         links[10 * N..].fill(0.0);
@@ -146,15 +174,26 @@ impl<const N: usize, const P: usize> Equation<N, P> {
                 if law.encoder_at_motor {
                     bridge_rest(middles, j, &mut torques);
                 }
-                let of = |torque: &f64| law.compliance.deflection(*torque);
-                with_rates(middles, &torques.iter().map(of).collect::<Vec<f64>>())
+                let of = |torque: f64| law.compliance.deflection(torque);
+                with_rates(middles, &low_passed(middles, &torques).into_iter().map(of).collect::<Vec<f64>>())
             })
             .collect();
-        if law.encoder_at_motor {
-            self.behind_motors(j, &deflections, &links)
-        } else {
-            self.of_motor(j, &deflections, theta)
+        let by_deflection = |deflections: &[Vec<[f64; 2]>]| {
+            if law.encoder_at_motor {
+                self.behind_motors(j, deflections, &links)
+            } else {
+                self.of_motor(j, deflections, theta)
+            }
+        };
+        let mut units = vec![by_deflection(&deflections)];
+        if law.compliance == Compliance::Elastic {
+            let lagging = |(log, deflections): (&Intervals<N>, &Vec<[f64; 2]>)| {
+                with_rates(&log.middles, &deflections.iter().map(|d| -d[1]).collect::<Vec<f64>>())
+            };
+            let lagging: Vec<_> = self.logs().iter().zip(&deflections).map(lagging).collect();
+            units.push(by_deflection(&lagging));
         }
+        units
     }
 
     /// Torque that the motor of joint `j` passes on along the measured motion, N m or N: the motor's torque less those of rotor inertia and friction.
@@ -224,12 +263,12 @@ impl<const N: usize, const P: usize> Equation<N, P> {
     }
 }
 
-/// Cache of the last torques of transmissions per unit of compliance or gap; a fit needs each torque at several sizes.
+/// Cache of the last torques of transmissions per unit of their parameters; a fit needs each torque at several sizes.
 #[derive(Debug)]
 pub struct Computed<const P: usize>(Mutex<VecDeque<Entry<P>>>);
 
-/// Cache entry: a transmission, the arm's parameters, and the transmission's torque per unit of compliance or gap.
-type Entry<const P: usize> = (TransmissionLaw, [f64; P], Arc<Signal>);
+/// Cache entry: a transmission, the arm's parameters, and the transmission's torques per unit of each of its parameters.
+type Entry<const P: usize> = (TransmissionLaw, [f64; P], Arc<Vec<Signal>>);
 
 /// Number of torque signals of transmissions that the cache holds.
 const KEPT: usize = 16;
@@ -241,18 +280,23 @@ impl<const P: usize> Default for Computed<P> {
 }
 
 impl<const P: usize> Computed<P> {
-    fn of(&self, law: &TransmissionLaw, theta: &[f64; P], compute: impl FnOnce() -> Signal) -> Arc<Signal> {
+    fn of(
+        &self,
+        law: &TransmissionLaw,
+        theta: &[f64; P],
+        compute: impl FnOnce() -> Vec<Signal>,
+    ) -> Arc<Vec<Signal>> {
         let kept = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((.., signal)) = kept().iter().find(|(l, t, _)| l == law && t == theta) {
-            return Arc::clone(signal);
+        if let Some((.., signals)) = kept().iter().find(|(l, t, _)| l == law && t == theta) {
+            return Arc::clone(signals);
         }
-        let signal = Arc::new(compute());
+        let signals = Arc::new(compute());
         let mut all = kept();
         if all.len() == KEPT {
             all.pop_front();
         }
-        all.push_back((*law, *theta, Arc::clone(&signal)));
-        signal
+        all.push_back((*law, *theta, Arc::clone(&signals)));
+        signals
     }
 }
 
@@ -281,6 +325,27 @@ fn bridge_rest<const N: usize>(middles: &[Middle<N>], j: usize, torques: &mut [f
         }
         k = end;
     }
+}
+
+/// Values at the middles of sample intervals, low-passed by a raised cosine of half width [`LOW_PASS_S`].
+fn low_passed<const N: usize>(middles: &[Middle<N>], values: &[f64]) -> Vec<f64> {
+    let at = |k: usize| {
+        let (mut sum, mut area) = (0.0, 0.0);
+        let mut add = |i: usize| -> bool {
+            let x = (middles[i].t - middles[k].t) / LOW_PASS_S;
+            if x.abs() >= 1.0 {
+                return false;
+            }
+            let weight = middles[i].h * (1.0 + (std::f64::consts::PI * x).cos());
+            sum += weight * values[i];
+            area += weight;
+            true
+        };
+        (0..=k).rev().take_while(|i| add(*i)).for_each(drop);
+        (k + 1..middles.len()).take_while(|i| add(*i)).for_each(drop);
+        sum / area
+    };
+    (0..values.len()).map(at).collect()
 }
 
 /// Deflections of a transmission at the middles of sample intervals, each with its rate from central differences.

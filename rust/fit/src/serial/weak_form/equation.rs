@@ -207,7 +207,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
             TermKind::Payload => self.of_link(N - 1, &of_load(&term.p)),
             TermKind::NominalLink(link) => self.of_link(link, &std::array::from_fn(|i| term.p[i])),
             TermKind::BaseTilt => self.of_tilt(&term.p, theta),
-            TermKind::Transmission(law) => self.of_transmission(&law, term.p[0], theta),
+            TermKind::Transmission(law) => self.of_transmission(&law, &term.p, theta),
             TermKind::Controller(setting) => self.of_controller(setting, term.p[0]),
             TermKind::Row(row) => self.of_row(&row, &term.p),
             TermKind::Table(ref table) => self.of_table(table, &term.p),
