@@ -21,9 +21,18 @@ use rayon::prelude::*;
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Largest displacement of a joint in numerical derivatives of torques by the deflection of a transmission, rad (m); torques are smooth functions of
-/// the displacement.
+/// Displacement of a joint, rad (m), and of its velocity, rad/s (m/s), in numerical derivatives of torques by the deflection of a transmission; torques
+/// are smooth functions of both.
 const DISPLACEMENT: f64 = 1e-3;
+
+/// Time between the instants at which these derivatives are computed, s: between them a motion of 2 Hz bends them by less than a hundredth.
+const SLOPES_S: f64 = 0.02;
+
+/// Derivatives of momentum and torque of the links by a joint's position, and by its velocity.
+type Slope<const N: usize> = [[SVector<f64, N>; 2]; 2];
+
+/// Derivatives by log and sample interval.
+type Slopes<const N: usize> = Vec<Vec<Slope<N>>>;
 
 /// Elasticity or backlash of one joint's transmission.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -178,12 +187,10 @@ impl<const N: usize, const P: usize> Equation<N, P> {
                 with_rates(middles, &low_passed(middles, &torques).into_iter().map(of).collect::<Vec<f64>>())
             })
             .collect();
-        let by_deflection = |deflections: &[Vec<[f64; 2]>]| {
-            if law.encoder_at_motor {
-                self.behind_motors(j, deflections, &links)
-            } else {
-                self.of_motor(j, deflections, theta)
-            }
+        let slopes = law.encoder_at_motor.then(|| self.slopes(j, &links));
+        let by_deflection = |deflections: &[Vec<[f64; 2]>]| match &slopes {
+            Some(slopes) => self.weak_parts(&Self::behind_motors(deflections, slopes)),
+            None => self.of_motor(j, deflections, theta),
         };
         let mut units = vec![by_deflection(&deflections)];
         if law.compliance == Compliance::Elastic {
@@ -210,33 +217,58 @@ impl<const N: usize, const P: usize> Equation<N, P> {
     }
 
     /// Change of the links' torque by joint and row of the weak form, to first order, where the encoder of joint `j` measures the motor and the link
-    /// is behind by the deflection; `deflections` holds deflection and rate by log and sample interval.
-    fn behind_motors(&self, j: usize, deflections: &[Vec<[f64; 2]>], links: &[f64; P]) -> Signal {
-        let largest = deflections.iter().flatten().fold(0.0, |a: f64, d| a.max(d[0].abs()));
-        if largest == 0.0 {
-            return vec![None; N];
-        }
-        let step = DISPLACEMENT / largest;
-        let changes: Vec<Vec<[SVector<f64, N>; 2]>> = self
-            .logs()
-            .iter()
-            .zip(deflections)
-            .map(|(log, deflections)| {
-                let at = |(m, [deflection, rate]): (&Middle<N>, &[f64; 2])| {
-                    let displaced = |by: f64| {
-                        let mut there = *m;
-                        there.q[j] -= by * deflection;
-                        there.dq[j] -= by * rate;
-                        there.mean_dq[j] -= by * rate;
-                        self.parts(&there, links)
-                    };
-                    let ([pa, ra], [pb, rb]) = (displaced(step), displaced(-step));
-                    [pa - pb, ra - rb].map(|x| x / (2.0 * step))
+    /// is behind by the deflection; `deflections` holds deflection and rate by log and sample interval, and `slopes` [`Self::slopes`].
+    fn behind_motors(deflections: &[Vec<[f64; 2]>], slopes: &Slopes<N>) -> Vec<Vec<[SVector<f64, N>; 2]>> {
+        let at = |([deflection, rate], [by_position, by_velocity]): (&[f64; 2], &Slope<N>)| {
+            std::array::from_fn(|part| -(by_position[part] * *deflection + by_velocity[part] * *rate))
+        };
+        let along = |(deflections, slopes): (&Vec<[f64; 2]>, &Vec<Slope<N>>)| {
+            deflections.iter().zip(slopes).map(at).collect()
+        };
+        deflections.iter().zip(slopes).map(along).collect()
+    }
+
+    /// Derivatives of the links' momentum, and of their torque without the momentum's derivative, by position and velocity of joint `j`, by log and
+    /// sample interval; computed at instants [`SLOPES_S`] apart and interpolated between them.
+    fn slopes(&self, j: usize, links: &[f64; P]) -> Slopes<N> {
+        let at = |m: &Middle<N>| -> Slope<N> {
+            let slope = |place: fn(&mut Middle<N>, usize, f64)| {
+                let displaced = |by: f64| {
+                    let mut there = *m;
+                    place(&mut there, j, by);
+                    self.parts(&there, links)
                 };
-                log.middles.par_iter().zip(deflections).map(at).collect()
-            })
-            .collect();
-        self.weak_parts(&changes)
+                let ([pa, ra], [pb, rb]) = (displaced(DISPLACEMENT), displaced(-DISPLACEMENT));
+                [pa - pb, ra - rb].map(|x| x / (2.0 * DISPLACEMENT))
+            };
+            [
+                slope(|m, j, by| m.q[j] += by),
+                slope(|m, j, by| {
+                    m.dq[j] += by;
+                    m.mean_dq[j] += by;
+                }),
+            ]
+        };
+        let along = |log: &Intervals<N>| {
+            let middles = &log.middles;
+            let mut knots: Vec<usize> = Vec::new();
+            for (k, m) in middles.iter().enumerate() {
+                let is_far = knots.last().is_none_or(|last| m.t - middles[*last].t > SLOPES_S - 0.5 * m.h);
+                if is_far || k + 1 == middles.len() {
+                    knots.push(k);
+                }
+            }
+            let values: Vec<Slope<N>> = knots.par_iter().map(|k| at(&middles[*k])).collect();
+            let between = |k: usize| {
+                let i = knots.partition_point(|knot| *knot <= k).min(knots.len() - 1).max(1);
+                let Some((a, b)) = values.get(i - 1).zip(values.get(i)) else { return values[0] };
+                let span = middles[knots[i]].t - middles[knots[i - 1]].t;
+                let part = (middles[k].t - middles[knots[i - 1]].t) / span;
+                std::array::from_fn(|x| std::array::from_fn(|y| a[x][y] * (1.0 - part) + b[x][y] * part))
+            };
+            (0..middles.len()).map(between).collect()
+        };
+        self.logs().iter().map(along).collect()
     }
 
     /// Change of the torque of rotor inertia and viscous friction, by joint and row of the weak form, where the encoder of joint `j` measures the
