@@ -101,6 +101,15 @@ struct FittedZeros<const N: usize> {
     inputs: Option<LogInputs<N>>,
 }
 
+/// A model whose fit and residual scales agree.
+struct Settled<const N: usize, const P: usize> {
+    hypothesis: Hypothesis<P>,
+    /// Scale of each joint's residual, rad or m.
+    scale: [f64; N],
+    /// Weighting of the training windows with these scales.
+    weighting: Weighting<N>,
+}
+
 /// Predictions of a hypothesis linearised around given initial states.
 struct Linearised<const N: usize> {
     /// Weighting with the initial states projected out, with all robust weights one.
@@ -309,7 +318,9 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     pub(crate) fn settle_rigid(&self) -> (Hypothesis<P>, Fit<P>) {
         let fitted = |theta: [f64; P]| {
             let from = Hypothesis::rigid(theta);
-            let (fit, _) = self.settle(&from, self.rough_scale(&from));
+            let with_zeros = EncoderZeros::can_be_told_from(&self.training.data);
+            let settled = self.settled_weighting(&from, self.rough_scale(&from), with_zeros);
+            let fit = self.problem(&settled.weighting).solve(&settled.hypothesis, Effort::FULL);
             let predicted = self.training.predict(&self.arm, &fit.hypothesis);
             let of_window =
                 |w: &Window<N>| rms::<N>(&self.training.measured[w.range()], &predicted[w.range()]);
@@ -318,8 +329,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
                 errors.zip(self.noise.iter().cycle()).map(|(error, noise)| error.max(*noise).ln()).sum();
             (from, fit, missed)
         };
-        let (from, fit, missed) = fitted(self.prior.theta);
-        let other = self.start.filter(|start| *start != self.prior.theta).map(fitted);
+        let start = self.start.filter(|start| *start != self.prior.theta);
+        let ((from, fit, missed), other) = rayon::join(|| fitted(self.prior.theta), || start.map(fitted));
         match other {
             Some((start, better, less)) if less < missed => (start, better),
             _ => (from, fit),
@@ -332,6 +343,19 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         scale: [f64; N],
         with_zeros: bool,
     ) -> (Fit<P>, SplitWeighting<N>) {
+        let Settled { hypothesis, scale, weighting: training } =
+            self.settled_weighting(start, scale, with_zeros);
+        let holdout = || {
+            let zeros = self.zeros_beside(&self.holdout, &hypothesis, scale, &training.zeros);
+            self.weighting(&self.holdout, &hypothesis, scale, &zeros)
+        };
+        let fit = || self.problem(&training).solve(&hypothesis, Effort::FULL);
+        let (holdout, fit) = rayon::join(holdout, fit);
+        (fit, SplitWeighting { training, holdout })
+    }
+
+    /// Model, residual scales and weighting of the training windows after alternate fits and re-estimates of the scales, until both agree.
+    fn settled_weighting(&self, start: &Hypothesis<P>, scale: [f64; N], with_zeros: bool) -> Settled<N, P> {
         self.progress.begin(Phase::Refit, MAX_ROUNDS + 1);
         let mut scale = scale;
         let mut hypothesis = start.clone();
@@ -346,12 +370,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             scale = next;
             change < SETTLED_SCALE_RATIO || round == MAX_ROUNDS
         });
-        let training = self.training_weighting(&hypothesis, scale, &zeros, with_zeros);
-        let zeros = self.zeros_beside(&self.holdout, &hypothesis, scale, &training.zeros);
-        let holdout = self.weighting(&self.holdout, &hypothesis, scale, &zeros);
-        let weights = SplitWeighting { training, holdout };
-        let fit = self.problem(&weights.training).solve(&hypothesis, Effort::FULL);
-        (fit, weights)
+        let weighting = self.training_weighting(&hypothesis, scale, &zeros, with_zeros);
+        Settled { hypothesis, scale, weighting }
     }
 
     /// Student-t cost of the training windows after parameters and encoder zeros of the recordings are estimated together, with the scales and the
