@@ -42,8 +42,8 @@ pub(crate) struct Screening<const N: usize> {
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// Hypotheses that are worth a full fit, each the fitted model with one more candidate, from the score tests around it. `size` is the RMS prediction
-    /// error relative to the motion, without relevance up to `min_relevance`.
+    /// Hypotheses that are worth a full fit, each the fitted model with one more candidate, from the score tests around it. `size` is the RMS
+    /// prediction error relative to the motion, without relevance up to `min_relevance`.
     pub(crate) fn initial_guesses(
         &self,
         fit: &Fit<P>,

@@ -275,7 +275,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         FittedZeros { zeros, offsets, inputs }
     }
 
-    /// Predictions linearised around initial states with the offsets `offsets`; `known` are the inputs of the logs under the hypothesis if they are known.
+    /// Predictions linearised around initial states with the offsets `offsets`; `known` are the inputs of the logs under the hypothesis, if known.
     fn linearised(
         &self,
         sample: &WindowSet<N>,

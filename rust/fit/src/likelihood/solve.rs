@@ -136,8 +136,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> FitProblem<'_, A, N, P> 
         self.weighting.costs(self.data, &self.residual(hypothesis))
     }
 
-    /// Whitened sensitivities of the prediction to the free values with indices `which`, given the residual at `hypothesis` and the inputs of the logs
-    /// there.
+    /// Whitened sensitivities of the prediction to the free values with indices `which`, given the residual at `hypothesis` and the inputs of the
+    /// logs there.
     pub(crate) fn sensitivities(
         &self,
         hypothesis: &Hypothesis<P>,
