@@ -165,7 +165,9 @@ class Drive:
             return np.asarray(np.linalg.lstsq(columns, measured, rcond=None)[0])
 
         # Of the regressor only the column of the torque depends on the delay: the other columns are projected out once.
-        others, sizes, _ = np.linalg.svd(np.concatenate([s.columns(0.0)[:, 1:] for s in stretches]), full_matrices=False)
+        others, sizes, _ = np.linalg.svd(
+            np.concatenate([s.columns(0.0)[:, 1:] for s in stretches]), full_matrices=False
+        )
         others = others[:, sizes > np.finfo(float).eps * len(others) * sizes[0]]
         apart = measured - others @ (others.T @ measured)
 
