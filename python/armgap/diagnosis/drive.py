@@ -169,13 +169,19 @@ class Drive:
             np.concatenate([s.columns(0.0)[:, 1:] for s in stretches]), full_matrices=False
         )
         others = others[:, sizes > np.finfo(float).eps * len(others) * sizes[0]]
-        apart = measured - others @ (others.T @ measured)
+
+        def alone(values: Array) -> Array:
+            # Not by `@`, which shares out products of this size among threads that then wait for each other.
+            along = np.einsum("ij,i->j", others, values)
+            return np.asarray(values - np.einsum("ij,j->i", others, along))
+
+        apart = alone(measured)
 
         def missed(delay: float) -> float:
-            tau = np.concatenate([s.delayed(delay) for s in stretches])
-            tau -= others @ (others.T @ tau)
-            left = apart - tau * (float(tau @ apart) / max(float(tau @ tau), np.finfo(float).tiny))
-            return float(left @ left)
+            tau = alone(np.concatenate([s.delayed(delay) for s in stretches]))
+            gain = np.einsum("i,i", tau, apart) / max(np.einsum("i,i", tau, tau), np.finfo(float).tiny)
+            left = apart - gain * tau
+            return float(np.einsum("i,i", left, left))
 
         sigma = max(_KERNEL_S, _KERNEL_PERIODS * logs[0].sample_period)
         delay = float(min(np.arange(_EARLIEST_S, _LATEST_S, _GRID * sigma), key=lambda d: missed(float(d))))
