@@ -107,9 +107,13 @@ class _Stretch:
             weighed(position, rate), weighed(position, curvature),
         )  # fmt: skip
 
+    def delayed(self, delay: float) -> Array:
+        """Return the commanded torque [N m or N] as it was `delay` seconds earlier, shape (n_inner,)."""
+        return np.asarray(np.interp(self.t[self.inner] - delay, self.t, self.tau))
+
     def columns(self, delay: float) -> Array:
         """Return the regressor of gain, offset, viscous part and inertia for a delay [s], shape (n_inner, 4)."""
-        tau = np.interp(self.t[self.inner] - delay, self.t, self.tau)
+        tau = self.delayed(delay)
         return np.stack([tau, np.ones_like(tau), -self.dq[self.inner], -self.ddq[self.inner]], axis=1)
 
     def by_delay(self, delay: float, gain: float) -> Array:
@@ -156,16 +160,33 @@ class Drive:
         if np.std(np.concatenate([s.tau[s.inner] for s in stretches])) <= _VARIES * np.std(measured):
             return None
 
-        def fitted(delay: float) -> tuple[Array, float]:
+        def fitted(delay: float) -> Array:
             columns = np.concatenate([s.columns(delay) for s in stretches])
-            linear = np.linalg.lstsq(columns, measured, rcond=None)[0]
-            left = measured - columns @ linear
-            return linear, float(left @ left)
+            return np.asarray(np.linalg.lstsq(columns, measured, rcond=None)[0])
+
+        # Of the regressor only the column of the torque depends on the delay: the other columns are projected out once.
+        others, sizes, _ = np.linalg.svd(
+            np.concatenate([s.columns(0.0)[:, 1:] for s in stretches]), full_matrices=False
+        )
+        others = others[:, sizes > np.finfo(float).eps * len(others) * sizes[0]]
+
+        def alone(values: Array) -> Array:
+            # Not by `@`, which shares out products of this size among threads that then wait for each other.
+            along = np.einsum("ij,i->j", others, values)
+            return np.asarray(values - np.einsum("ij,j->i", others, along))
+
+        apart = alone(measured)
+
+        def missed(delay: float) -> float:
+            tau = alone(np.concatenate([s.delayed(delay) for s in stretches]))
+            gain = np.einsum("i,i", tau, apart) / max(np.einsum("i,i", tau, tau), np.finfo(float).tiny)
+            left = apart - gain * tau
+            return float(np.einsum("i,i", left, left))
 
         sigma = max(_KERNEL_S, _KERNEL_PERIODS * logs[0].sample_period)
-        delay = float(min(np.arange(_EARLIEST_S, _LATEST_S, _GRID * sigma), key=lambda d: fitted(float(d))[1]))
+        delay = float(min(np.arange(_EARLIEST_S, _LATEST_S, _GRID * sigma), key=lambda d: missed(float(d))))
         for _ in range(_DELAY_ITERATIONS):
-            values = np.append(delay, fitted(delay)[0])
+            values = np.append(delay, fitted(delay))
             jacobian = [_jacobian(s, values) for s in stretches]
             residual = [s.measured - s.columns(delay) @ values[1:] for s in stretches]
             delay += float(np.linalg.lstsq(np.concatenate(jacobian), np.concatenate(residual), rcond=None)[0][0])

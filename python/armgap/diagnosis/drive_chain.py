@@ -166,7 +166,8 @@ def drive_chain(
     signals = list(case.signals())
     if not signals:
         return []
-    drives = {s.joint: Drive.identify(training, s.joint) for s in signals if s.stage == "drive"}
+    driven = dict.fromkeys(s.joint for s in signals if s.stage == "drive")
+    drives = {joint: Drive.identify(training, joint) for joint in driven}
     gains, left, whole = _replaced(case, signals)
     if not np.isfinite(whole):
         return []  # diverging predictions give no measure of the gap

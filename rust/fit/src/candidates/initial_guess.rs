@@ -6,6 +6,7 @@ use crate::candidates::screen::{ScoreTest, effect_instances, screen};
 use crate::likelihood::context::{DiagnosisContext, SplitWeighting};
 use crate::likelihood::holdout::CONSEQUENTIAL_ERROR;
 use crate::likelihood::holdout::is_plausible;
+use crate::likelihood::jacobian::Sensitivities;
 use crate::likelihood::solve::Fit;
 use crate::model::hypothesis::{EffectInstance, Hypothesis};
 use crate::progress::Phase;
@@ -30,28 +31,35 @@ const TRACE: f64 = 0.01;
 /// only an effect that explains most of such a gap would be named.
 const TRACE_IN_SMALL: f64 = 0.2;
 
+/// Score tests of all candidates around a fit.
+pub(crate) struct Screening<const N: usize> {
+    /// All candidates at their initial guesses, those not in the model first.
+    pub(crate) candidates: Vec<EffectInstance>,
+    /// Score test of each candidate.
+    pub(crate) tests: Vec<ScoreTest>,
+    /// Jacobian of the predictions on the training windows at the fit.
+    pub(crate) jacobian: Sensitivities<N>,
+}
+
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// Hypotheses that are worth a full fit, each the fitted model with one more candidate, and the score tests of all candidates (those not in the
-    /// model first; empty if no test was made). `size` is the RMS prediction error relative to the motion, without relevance up to `min_relevance`.
+    /// Hypotheses that are worth a full fit, each the fitted model with one more candidate, from the score tests around it. `size` is the RMS
+    /// prediction error relative to the motion, without relevance up to `min_relevance`.
     pub(crate) fn initial_guesses(
         &self,
         fit: &Fit<P>,
         weights: &SplitWeighting<N>,
+        screening: &Screening<N>,
         size: f64,
         min_relevance: f64,
-    ) -> (Vec<Hypothesis<P>>, Vec<ScoreTest>) {
+    ) -> Vec<Hypothesis<P>> {
         let gap = size > min_relevance;
-        if !gap && is_plausible::<P>(fit.prior_cost) {
-            return (Vec::new(), Vec::new());
-        }
-        let (all, screened) = self.screened(fit, weights);
         let training: f64 = self.problem(&weights.training).window_costs(&fit.hypothesis).iter().sum();
         let least = match size {
             _ if !gap => f64::INFINITY,
             _ if size < CONSEQUENTIAL_ERROR => TRACE_IN_SMALL * self.above_floor(training, weights),
             _ => TRACE * training,
         };
-        let more = promising(&screened, least).into_iter().map(|found| {
+        let more = promising(&screening.tests, least).into_iter().map(|found| {
             let effect = found.effect;
             self.payload_guess(&fit.hypothesis, effect)
                 .unwrap_or_else(|| self.compensated(&fit.hypothesis, found))
@@ -60,16 +68,23 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         if !is_plausible::<P>(fit.prior_cost) {
             // A contact that carries a part of the load all the time has biased the parameters that were fitted without it.
             let trusted = Hypothesis { theta: self.prior.theta, ..fit.hypothesis.clone() };
-            initial_guesses
-                .extend(self.contact_guesses(&all, &trusted).into_iter().map(|stop| trusted.with(stop)));
+            initial_guesses.extend(
+                self.contact_guesses(&screening.candidates, &trusted)
+                    .into_iter()
+                    .map(|stop| trusted.with(stop)),
+            );
         }
-        (initial_guesses, screened)
+        initial_guesses
     }
 
     /// Largest part of the training windows' cost above the noise floor that a single candidate removes to first order.
-    pub(crate) fn largest_gain(&self, fit: &Fit<P>, weights: &SplitWeighting<N>) -> f64 {
-        let (_, screened) = self.screened(fit, weights);
-        let gains = screened.into_iter().map(|test| test.gain);
+    pub(crate) fn largest_gain(
+        &self,
+        fit: &Fit<P>,
+        weights: &SplitWeighting<N>,
+        screening: &Screening<N>,
+    ) -> f64 {
+        let gains = screening.tests.iter().map(|test| test.gain);
         let cost: f64 = self.problem(&weights.training).window_costs(&fit.hypothesis).iter().sum();
         gains.fold(0.0, f64::max) / self.above_floor(cost, weights)
     }
@@ -80,14 +95,16 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         (cost - rows * self.floor(weights)).max(1e-9 * cost)
     }
 
-    /// All candidates at their initial guesses, those not in the model first, and the score test of each.
-    fn screened(&self, fit: &Fit<P>, weights: &SplitWeighting<N>) -> (Vec<EffectInstance>, Vec<ScoreTest>) {
+    /// Score tests of all candidates around a fit.
+    pub(crate) fn screened(&self, fit: &Fit<P>, weights: &SplitWeighting<N>) -> Screening<N> {
         let mut all = self.open_candidates(&fit.hypothesis);
         all.extend(self.ripple_guesses(&all, weights, fit));
         all.extend(self.contact_guesses(&all, &fit.hypothesis));
         self.progress.begin(Phase::Screen, all.len());
-        let screened = screen(&self.problem(&weights.training), &fit.hypothesis, &all);
-        (all, screened)
+        let problem = self.problem(&weights.training);
+        let jacobian = problem.jacobian(&fit.hypothesis);
+        let tests = screen(&problem, &fit.hypothesis, &jacobian, &all);
+        Screening { candidates: all, tests, jacobian }
     }
 
     /// Candidate effects that are not yet in `model`, at their initial guesses.

@@ -3,9 +3,11 @@
 //! With `H` the inner products of the sensitivities of the free values (prior precision included) and `s` their products with the residual, a
 //! further parameter with sensitivity `c` reduces the cost by `(s_c - H_c H^-1 s)^2 / (H_cc - H_c H^-1 H_c')` (Rao 1948).
 
+use crate::likelihood::jacobian::Sensitivities;
 use crate::likelihood::scale::Scales;
 use crate::likelihood::solve::{FitProblem, inverse_of_seen, neutral};
 use crate::model::hypothesis::{EffectInstance, Hypothesis};
+use crate::predict::log_inputs::LogInputs;
 use armgap_core::arm::Arm;
 use armgap_core::effect::{Scope, Trial, catalogue};
 use armgap_core::transmission::Sides;
@@ -88,22 +90,21 @@ fn whole(sides: &[Sides]) -> Vec<&Sides> {
     if found.is_empty() { sides.iter().collect() } else { found }
 }
 
-/// Score tests of all candidates around the fitted hypothesis `base`.
+/// Score tests of all candidates around the fitted hypothesis `base`, with the Jacobian `jacobian` there.
 pub fn screen<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     problem: &FitProblem<A, N, P>,
     base: &Hypothesis<P>,
+    jacobian: &Sensitivities<N>,
     candidates: &[EffectInstance],
 ) -> Vec<ScoreTest> {
-    let residual = problem.residual(base);
-    let free: Vec<usize> = (0..base.values().len()).collect();
-    let mut columns = problem.sensitivities(base, &residual, &free);
-    let k = columns.len();
+    let inputs = jacobian.inputs.as_ref();
+    let (residual, _) = problem.residual_beside(base, inputs);
+    let k = jacobian.columns.len();
     let before: f64 = student_t_total(problem, &residual);
     let traced: Vec<(Vec<f64>, Option<f64>)> =
-        candidates.par_iter().map(|c| trace(problem, base, &residual, before, c)).collect();
+        candidates.par_iter().map(|c| trace(problem, base, &residual, inputs, before, c)).collect();
     let (traces, direct): (Vec<Vec<f64>>, Vec<Option<f64>>) = traced.into_iter().unzip();
-    columns.extend(traces);
-    let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+    let columns: Vec<&[f64]> = jacobian.columns.iter().chain(&traces).map(Vec::as_slice).collect();
     let gram = problem.weighting.gram_with(k, problem.data, &columns, &residual);
     let last = gram.total.nrows() - 1;
     let mut own = gram.total.view((0, 0), (k, k)).into_owned();
@@ -145,6 +146,7 @@ fn trace<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     problem: &FitProblem<A, N, P>,
     base: &Hypothesis<P>,
     residual: &[f64],
+    inputs: Option<&LogInputs<N>>,
     before: f64,
     candidate: &EffectInstance,
 ) -> (Vec<f64>, Option<f64>) {
@@ -159,7 +161,7 @@ fn trace<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         Trial::Ray => (EffectInstance { p: candidate.p.map(|x| TRIAL * x), ..*candidate }, TRIAL),
         Trial::Whole | Trial::Disturbance => (*candidate, 1.0),
     };
-    let there = problem.residual(&base.with(moved));
+    let (there, _) = problem.residual_beside(&base.with(moved), inputs);
     problem.progress.unit();
     // An effect with a threshold may act in few windows, whose robust weights are nearly zero until the effect explains their residuals.
     let direct =

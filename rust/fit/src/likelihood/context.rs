@@ -6,6 +6,7 @@ use crate::likelihood::solve::{Effort, Fit, FitProblem, Prior};
 use crate::likelihood::weighting::{Gram, Weighting, initial_state_sensitivities};
 use crate::model::hypothesis::{EffectInstance, Hypothesis};
 use crate::numeric::products::rms;
+use crate::predict::log_inputs::LogInputs;
 use crate::predict::window::{Dataset, InitialStateOffset, Window};
 use crate::progress::{Phase, ProgressReporter};
 use armgap_core::arm::Arm;
@@ -96,6 +97,29 @@ impl<const N: usize> WindowSet<N> {
 struct FittedZeros<const N: usize> {
     zeros: EncoderZeros<N>,
     offsets: Vec<InitialStateOffset<N>>,
+    /// Inputs of the logs under the hypothesis.
+    inputs: Option<LogInputs<N>>,
+}
+
+/// A model whose fit and residual scales agree.
+struct Settled<const N: usize, const P: usize> {
+    hypothesis: Hypothesis<P>,
+    /// Scale of each joint's residual, rad or m.
+    scale: [f64; N],
+    /// Weighting of the training windows with these scales.
+    weighting: Weighting<N>,
+}
+
+/// Predictions of a hypothesis linearised around given initial states.
+struct Linearised<const N: usize> {
+    /// Weighting with the initial states projected out, with all robust weights one.
+    weighting: Weighting<N>,
+    /// Whitened residual of the predictions.
+    residual: Vec<f64>,
+    /// Derivatives of the predictions by initial positions and velocities.
+    sensitivities: Vec<Vec<f64>>,
+    /// Inputs of the logs under the hypothesis.
+    inputs: Option<LogInputs<N>>,
 }
 
 /// Inverse covariances of the windows' prediction errors under one hypothesis.
@@ -194,9 +218,10 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             return self.weighting(sample, hypothesis, scale, zeros);
         }
         let of_training = |gram: &Gram, zeros: &EncoderZeros<N>| zeros.of_training(&sample.data, gram);
-        let FittedZeros { zeros, offsets } =
+        let FittedZeros { zeros, offsets, inputs } =
             self.fitting_zeros(sample, hypothesis, scale, zeros, of_training);
-        let (weighting, residual, _) = self.linearised(sample, hypothesis, scale, offsets);
+        let Linearised { weighting, residual, .. } =
+            self.linearised(sample, hypothesis, scale, offsets, inputs.as_ref());
         weighting.robust(&sample.data, &residual).with_zeros(zeros)
     }
 
@@ -209,9 +234,12 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         scale: [f64; N],
         zeros: &EncoderZeros<N>,
     ) -> Weighting<N> {
-        let (rough, residual, _) = self.linearised(sample, hypothesis, scale, zeros.offsets(&sample.data));
-        let offsets = bounded(&sample.data, rough.refit_initial_states(&sample.data, &residual));
-        let (weighting, residual, _) = self.linearised(sample, hypothesis, scale, offsets);
+        let offsets = zeros.offsets(&sample.data);
+        let rough = self.linearised(sample, hypothesis, scale, offsets, None);
+        let offsets =
+            bounded(&sample.data, rough.weighting.refit_initial_states(&sample.data, &rough.residual));
+        let Linearised { weighting, residual, .. } =
+            self.linearised(sample, hypothesis, scale, offsets, rough.inputs.as_ref());
         weighting.robust(&sample.data, &residual).with_zeros(zeros.clone())
     }
 
@@ -226,8 +254,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         fitted: impl Fn(&Gram, &EncoderZeros<N>) -> EncoderZeros<N>,
     ) -> FittedZeros<N> {
         let data = &sample.data;
-        let (rough, mut residual, sensitivities) =
-            self.linearised(sample, hypothesis, scale, zeros.offsets(data));
+        let Linearised { weighting: rough, mut residual, sensitivities, inputs } =
+            self.linearised(sample, hypothesis, scale, zeros.offsets(data), None);
         let rough = rough.robust(data, &residual);
         let columns = rough.zero_columns(&sensitivities);
         let views: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
@@ -244,25 +272,26 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         for (offset, refitted) in offsets.iter_mut().zip(refitted) {
             *offset = InitialStateOffset { zero: offset.zero, ..refitted };
         }
-        FittedZeros { zeros, offsets }
+        FittedZeros { zeros, offsets, inputs }
     }
 
-    /// Weighting linearised around the predictions from initial states with the offsets `offsets`, the whitened residual of these predictions, and
-    /// their derivatives by initial positions and velocities.
+    /// Predictions linearised around initial states with the offsets `offsets`; `known` are the inputs of the logs under the hypothesis, if known.
     fn linearised(
         &self,
         sample: &WindowSet<N>,
         hypothesis: &Hypothesis<P>,
         scale: [f64; N],
         offsets: Vec<InitialStateOffset<N>>,
-    ) -> (Weighting<N>, Vec<f64>, Vec<Vec<f64>>) {
+        known: Option<&LogInputs<N>>,
+    ) -> Linearised<N> {
         self.progress.check();
-        let predicted = sample.data.predict(&self.arm, hypothesis, &offsets);
+        let (data, arm) = (&sample.data, &self.arm);
+        let (predicted, inputs) = data.predict_beside(arm, hypothesis, &offsets, known);
         let sensitivities =
-            initial_state_sensitivities(&sample.data, &self.arm, hypothesis, &offsets, &predicted);
+            initial_state_sensitivities(data, arm, hypothesis, &offsets, &predicted, inputs.as_ref());
         let weighting = Weighting::from_sensitivities(&sample.data, &sensitivities, scale, offsets);
         let residual = weighting.residual(&sample.measured, &predicted);
-        (weighting, residual, sensitivities)
+        Linearised { weighting, residual, sensitivities, inputs }
     }
 
     /// Fits the model and re-estimates the residual scales alternately, from the first scales `scale` per joint, rad or m, until both agree, with
@@ -289,7 +318,9 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     pub(crate) fn settle_rigid(&self) -> (Hypothesis<P>, Fit<P>) {
         let fitted = |theta: [f64; P]| {
             let from = Hypothesis::rigid(theta);
-            let (fit, _) = self.settle(&from, self.rough_scale(&from));
+            let with_zeros = EncoderZeros::can_be_told_from(&self.training.data);
+            let settled = self.settled_weighting(&from, self.rough_scale(&from), with_zeros);
+            let fit = self.problem(&settled.weighting).solve(&settled.hypothesis, Effort::FULL);
             let predicted = self.training.predict(&self.arm, &fit.hypothesis);
             let of_window =
                 |w: &Window<N>| rms::<N>(&self.training.measured[w.range()], &predicted[w.range()]);
@@ -298,8 +329,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
                 errors.zip(self.noise.iter().cycle()).map(|(error, noise)| error.max(*noise).ln()).sum();
             (from, fit, missed)
         };
-        let (from, fit, missed) = fitted(self.prior.theta);
-        let other = self.start.filter(|start| *start != self.prior.theta).map(fitted);
+        let start = self.start.filter(|start| *start != self.prior.theta);
+        let ((from, fit, missed), other) = rayon::join(|| fitted(self.prior.theta), || start.map(fitted));
         match other {
             Some((start, better, less)) if less < missed => (start, better),
             _ => (from, fit),
@@ -312,6 +343,19 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         scale: [f64; N],
         with_zeros: bool,
     ) -> (Fit<P>, SplitWeighting<N>) {
+        let Settled { hypothesis, scale, weighting: training } =
+            self.settled_weighting(start, scale, with_zeros);
+        let holdout = || {
+            let zeros = self.zeros_beside(&self.holdout, &hypothesis, scale, &training.zeros);
+            self.weighting(&self.holdout, &hypothesis, scale, &zeros)
+        };
+        let fit = || self.problem(&training).solve(&hypothesis, Effort::FULL);
+        let (holdout, fit) = rayon::join(holdout, fit);
+        (fit, SplitWeighting { training, holdout })
+    }
+
+    /// Model, residual scales and weighting of the training windows after alternate fits and re-estimates of the scales, until both agree.
+    fn settled_weighting(&self, start: &Hypothesis<P>, scale: [f64; N], with_zeros: bool) -> Settled<N, P> {
         self.progress.begin(Phase::Refit, MAX_ROUNDS + 1);
         let mut scale = scale;
         let mut hypothesis = start.clone();
@@ -326,12 +370,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             scale = next;
             change < SETTLED_SCALE_RATIO || round == MAX_ROUNDS
         });
-        let training = self.training_weighting(&hypothesis, scale, &zeros, with_zeros);
-        let zeros = self.zeros_beside(&self.holdout, &hypothesis, scale, &training.zeros);
-        let holdout = self.weighting(&self.holdout, &hypothesis, scale, &zeros);
-        let weights = SplitWeighting { training, holdout };
-        let fit = self.problem(&weights.training).solve(&hypothesis, Effort::FULL);
-        (fit, weights)
+        let weighting = self.training_weighting(&hypothesis, scale, &zeros, with_zeros);
+        Settled { hypothesis, scale, weighting }
     }
 
     /// Student-t cost of the training windows after parameters and encoder zeros of the recordings are estimated together, with the scales and the

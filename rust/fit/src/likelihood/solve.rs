@@ -4,10 +4,11 @@
 //! file's values and sigmas, over the free values within their bounds.
 
 use crate::likelihood::covariance::ParameterCovariance;
-use crate::likelihood::jacobian::{Jacobian, Linearisation};
+use crate::likelihood::jacobian::{Jacobian, Linearisation, Sensitivities};
 use crate::likelihood::scale::Scales;
 use crate::likelihood::weighting::{Gram, Weighting};
 use crate::model::hypothesis::{EffectInstance, Hypothesis};
+use crate::predict::log_inputs::LogInputs;
 use crate::predict::window::Dataset;
 use crate::progress::ProgressReporter;
 use armgap_core::arm::Arm;
@@ -109,9 +110,20 @@ impl<const P: usize> Fit<P> {
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> FitProblem<'_, A, N, P> {
     /// Whitened residual of a hypothesis, measured minus predicted, by window, sample and joint.
     pub fn residual(&self, hypothesis: &Hypothesis<P>) -> Vec<f64> {
+        self.residual_beside(hypothesis, None).0
+    }
+
+    /// Whitened residual of a hypothesis, and the inputs of the logs under it; `known` are those under another hypothesis, shared where they are the
+    /// same.
+    pub(crate) fn residual_beside(
+        &self,
+        hypothesis: &Hypothesis<P>,
+        known: Option<&LogInputs<N>>,
+    ) -> (Vec<f64>, Option<LogInputs<N>>) {
         self.progress.check();
-        let predicted = self.data.predict(self.arm, hypothesis, &self.weighting.offsets);
-        self.weighting.residual(self.measured, &predicted)
+        let (predicted, inputs) =
+            self.data.predict_beside(self.arm, hypothesis, &self.weighting.offsets, known);
+        (self.weighting.residual(self.measured, &predicted), inputs)
     }
 
     /// Student-t cost of every window under a hypothesis.
@@ -124,11 +136,13 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> FitProblem<'_, A, N, P> 
         self.weighting.costs(self.data, &self.residual(hypothesis))
     }
 
-    /// Whitened sensitivities of the prediction to the free values with indices `which`, given the residual at `hypothesis`.
-    pub fn sensitivities(
+    /// Whitened sensitivities of the prediction to the free values with indices `which`, given the residual at `hypothesis` and the inputs of the
+    /// logs there.
+    pub(crate) fn sensitivities(
         &self,
         hypothesis: &Hypothesis<P>,
         residual: &[f64],
+        inputs: Option<&LogInputs<N>>,
         which: &[usize],
     ) -> Vec<Vec<f64>> {
         let values = hypothesis.values();
@@ -138,16 +152,15 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> FitProblem<'_, A, N, P> 
             .map(|&i| {
                 let mut moved = values.clone();
                 moved[i] += steps[i];
-                let there = self.residual(&hypothesis.with_values(&moved));
+                let (there, _) = self.residual_beside(&hypothesis.with_values(&moved), inputs);
                 residual.iter().zip(&there).map(|(here, there)| (here - there) / steps[i]).collect()
             })
             .collect()
     }
 
-    /// Whitened Jacobian of the prediction by all free values, one column each.
-    pub fn jacobian(&self, hypothesis: &Hypothesis<P>) -> Vec<Vec<f64>> {
-        let all: Vec<usize> = (0..hypothesis.values().len()).collect();
-        self.sensitivities(hypothesis, &self.residual(hypothesis), &all)
+    /// Jacobian of the prediction by all free values.
+    pub fn jacobian(&self, hypothesis: &Hypothesis<P>) -> Sensitivities<N> {
+        Sensitivities::new(self, hypothesis)
     }
 
     /// Displacements of the free values for sensitivities by forward differences, inward at an upper bound.
@@ -190,14 +203,20 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> FitProblem<'_, A, N, P> 
 
     /// Minimises the cost over all free values, starting from `initial_guess`.
     pub fn solve(&self, initial_guess: &Hypothesis<P>, effort: Effort) -> Fit<P> {
-        self.solve_reusing(initial_guess, effort, &[])
+        self.solve_reusing(initial_guess, effort, None)
     }
 
     /// Minimises the cost from `initial_guess`, reusing the Jacobian columns `known` of a neighbouring hypothesis for the first values as long as the
     /// cost falls as these columns predict.
-    pub fn solve_reusing(&self, initial_guess: &Hypothesis<P>, effort: Effort, known: &[Vec<f64>]) -> Fit<P> {
+    pub fn solve_reusing(
+        &self,
+        initial_guess: &Hypothesis<P>,
+        effort: Effort,
+        known: Option<&Sensitivities<N>>,
+    ) -> Fit<P> {
         let (lower, upper) = self.bounds(initial_guess);
-        let mut at = Linearisation::new(self, initial_guess.clone());
+        let inputs = known.and_then(|known| known.inputs.as_ref());
+        let mut at = Linearisation::new(self, initial_guess.clone(), inputs);
         let mut damping = 1e-4;
         let mut jacobian = Jacobian::reusing(self, &at, known);
         'search: for _ in 0..effort.iterations {
@@ -211,7 +230,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> FitProblem<'_, A, N, P> 
                 if jacobian.is_reused && foreseen < MIN_PREDICTED_DECREASE * effort.enough * at.cost() {
                     break 'search;
                 }
-                let trial = Linearisation::new(self, at.hypothesis.with_values(&values));
+                let trial = Linearisation::new(self, at.hypothesis.with_values(&values), at.inputs.as_ref());
                 if trial.cost() < at.cost() {
                     fall = Some((at.cost() - trial.cost(), foreseen));
                     at = trial;
@@ -256,10 +275,9 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> FitProblem<'_, A, N, P> 
 
     /// Cost at a hypothesis after a first-order re-estimate of its free values, with the Jacobian of a neighbouring hypothesis; infinite where it
     /// cannot be computed.
-    pub(crate) fn cost_refitted(&self, hypothesis: &Hypothesis<P>, jacobian: &[Vec<f64>]) -> f64 {
-        let residual = self.residual(hypothesis);
-        let columns: Vec<&[f64]> = jacobian.iter().map(Vec::as_slice).collect();
-        let gram = self.weighting.gram(self.data, &columns, &residual);
+    pub(crate) fn cost_refitted(&self, hypothesis: &Hypothesis<P>, jacobian: &Sensitivities<N>) -> f64 {
+        let (residual, _) = self.residual_beside(hypothesis, jacobian.inputs.as_ref());
+        let gram = jacobian.gram_with(self, &residual);
         let (normal, gradient) = self.normal_equations(&gram, hypothesis);
         let k = gradient.len();
         let as_it_is = gram.total[(k, k)] + self.prior.cost(&hypothesis.theta);
@@ -282,7 +300,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> FitProblem<'_, A, N, P> 
     }
 
     /// Covariance of the free values at a point of the fit.
-    fn covariance(&self, gram: &Gram, at: &Linearisation<P>) -> ParameterCovariance {
+    fn covariance(&self, gram: &Gram, at: &Linearisation<N, P>) -> ParameterCovariance {
         let (lower, upper) = self.bounds(&at.hypothesis);
         let prior_precision: Vec<f64> =
             (0..lower.len()).map(|i| if i < P { self.prior.sigma[i].powi(-2) } else { 0.0 }).collect();

@@ -13,7 +13,8 @@
 use crate::likelihood::encoder_zero::EncoderZeros;
 use crate::log::track::InitialState;
 use crate::model::hypothesis::Hypothesis;
-use crate::numeric::products::{cross, squares};
+use crate::numeric::products::{cross, lower_rows, squares};
+use crate::predict::log_inputs::LogInputs;
 use crate::predict::window::{Dataset, InitialStateOffset};
 use armgap_core::arm::Arm;
 use nalgebra::{DMatrix, DVector, SVector};
@@ -65,6 +66,39 @@ impl Projection {
         (squares(&[residual])[0] + self.prior_residual.norm_squared() - coordinates).max(0.0)
     }
 
+    /// Inner products of all columns and last the residual in one window, with its initial state projected out, and the coordinates of each in the
+    /// basis `Q`; those of the first columns are taken over from `known`.
+    fn gram(&self, known: Option<&WindowGram>, columns: &[&[f64]], residual: &[f64]) -> WindowGram {
+        let all: Vec<&[f64]> = columns.iter().copied().chain([residual]).collect();
+        let (size, basis) = (all.len(), self.basis());
+        let count = known.map_or(0, |known| known.count);
+        let old = known.map_or(&[][..], |known| &known.products);
+        let mut coordinates = Vec::with_capacity(size * basis.len());
+        coordinates.extend(known.iter().flat_map(|known| &known.coordinates).take(count * basis.len()));
+        coordinates.extend(cross(&all[count..], &basis));
+        let at = |c: usize| c * basis.len()..(c + 1) * basis.len();
+        for (coordinate, prior) in coordinates[at(size - 1)].iter_mut().zip(&self.prior_coordinates()) {
+            *coordinate += prior;
+        }
+        let mut products = vec![0.0; size * size];
+        for i in 0..count {
+            products[i * size..i * size + count].copy_from_slice(&old[i * (count + 1)..][..count]);
+        }
+        let along = |a: usize, b: usize| -> f64 {
+            coordinates[at(a)].iter().zip(&coordinates[at(b)]).map(|(a, b)| a * b).sum()
+        };
+        let mut rows = lower_rows(&all, count).into_iter();
+        for i in count..size {
+            for (c, product) in rows.by_ref().take(i + 1).enumerate() {
+                let product = product - along(i, c);
+                products[i * size + c] = product;
+                products[c * size + i] = product;
+            }
+        }
+        products[size * size - 1] += self.prior_residual.norm_squared();
+        WindowGram { count: size - 1, products, coordinates }
+    }
+
     /// Inner products in one window, with its initial state projected out: of each of the first `lead` columns, and last the residual, with all
     /// columns and last the residual, row by row; then the squared lengths of the columns after the first `lead`.
     fn products(&self, lead: usize, columns: &[&[f64]], residual: &[f64]) -> Vec<f64> {
@@ -111,6 +145,17 @@ pub struct Weighting<const N: usize> {
     projections: Vec<Projection>,
 }
 
+/// Inner products of `count` columns, and last the residual, in one window with its initial state projected out.
+#[derive(Debug, Clone, Default)]
+struct WindowGram {
+    /// Number of columns, without the residual.
+    count: usize,
+    /// Matrix of inner products, row by row.
+    products: Vec<f64>,
+    /// Coordinates of every column and last of the residual in the window's basis `Q`, one after another.
+    coordinates: Vec<f64>,
+}
+
 /// Inner products of whitened Jacobian columns, and last the whitened residual, with initial states projected out and windows weighted robustly.
 #[derive(Debug, Clone, Default)]
 pub struct Gram {
@@ -118,8 +163,8 @@ pub struct Gram {
     pub total: DMatrix<f64>,
     /// Inner products of every column with the residual, per window.
     pub scores: Vec<DVector<f64>>,
-    /// Inner products of all columns per window, row by row; empty if not all were computed.
-    products: Vec<Vec<f64>>,
+    /// Inner products of all columns per window, without robust weights; empty if not all were computed.
+    windows: Vec<WindowGram>,
     robust_weight: Vec<f64>,
 }
 
@@ -130,14 +175,16 @@ impl Gram {
         let windows = products.iter().map(|p| DMatrix::from_row_slice(k + 1, k + 1, p));
         let total = windows.fold(DMatrix::zeros(k + 1, k + 1), |sum, window| sum + window);
         let scores = products.iter().map(|p| DVector::from_column_slice(&p[k * (k + 1)..])).collect();
-        Self { total, scores, robust_weight: vec![1.0; products.len()], products }
+        let robust_weight = vec![1.0; products.len()];
+        let window = |products| WindowGram { count: k, products, coordinates: Vec::new() };
+        Self { total, scores, windows: products.into_iter().map(window).collect(), robust_weight }
     }
 
     /// Inner products in one window of the columns with indices `of`, column `of[a]` multiplied by `unit[a]`, times the window's robust weight;
     /// requires the products of all columns.
     pub fn within(&self, window: usize, of: &[usize], unit: &[f64]) -> DMatrix<f64> {
         let columns = self.total.nrows();
-        let (products, robust_weight) = (&self.products[window], self.robust_weight[window]);
+        let (products, robust_weight) = (&self.windows[window].products, self.robust_weight[window]);
         let entry =
             |a: usize, b: usize| products[of[a] * columns + of[b]] * unit[a] * unit[b] * robust_weight;
         DMatrix::from_fn(of.len(), of.len(), entry)
@@ -155,7 +202,9 @@ impl<const N: usize> Weighting<N> {
         offsets: Vec<InitialStateOffset<N>>,
         predicted: &[f64],
     ) -> Self {
-        let sensitivities = initial_state_sensitivities(data, arm, hypothesis, &offsets, predicted);
+        let inputs = data.log_inputs(arm, hypothesis);
+        let sensitivities =
+            initial_state_sensitivities(data, arm, hypothesis, &offsets, predicted, inputs.as_ref());
         Self::from_sensitivities(data, &sensitivities, scale, offsets)
     }
 
@@ -230,7 +279,28 @@ impl<const N: usize> Weighting<N> {
 
     /// Inner products of whitened `columns` and, last, a whitened `residual`, with initial states projected out.
     pub fn gram(&self, data: &Dataset<N>, columns: &[&[f64]], residual: &[f64]) -> Gram {
-        self.gram_with(columns.len(), data, columns, residual)
+        self.gram_beyond(&Gram::default(), data, columns, residual)
+    }
+
+    /// Inner products of whitened `columns` and, last, a whitened `residual`, with initial states projected out; those of the first columns are taken
+    /// over from `known`, where they were computed under this weighting.
+    pub fn gram_beyond(&self, known: &Gram, data: &Dataset<N>, columns: &[&[f64]], residual: &[f64]) -> Gram {
+        let k = columns.len();
+        let one = |(index, projection): (usize, &Projection)| {
+            let range = data.windows[index].range();
+            let part: Vec<&[f64]> = columns.iter().map(|c| &c[range.clone()]).collect();
+            projection.gram(known.windows.get(index), &part, &residual[range])
+        };
+        let windows: Vec<WindowGram> = self.projections.par_iter().enumerate().map(one).collect();
+        let mut total = DMatrix::zeros(k + 1, k + 1);
+        let mut scores = Vec::with_capacity(windows.len());
+        for (window, robust_weight) in windows.iter().zip(&self.robust_weight) {
+            for (sum, product) in total.iter_mut().zip(&window.products) {
+                *sum += product * robust_weight;
+            }
+            scores.push(DVector::from_column_slice(&window.products[k * (k + 1)..]) * *robust_weight);
+        }
+        Gram { total, scores, windows, robust_weight: self.robust_weight.clone() }
     }
 
     /// Inner products of whitened `columns` and, last, a whitened `residual`; products of two different columns after the first `lead` stay zero.
@@ -260,8 +330,7 @@ impl<const N: usize> Weighting<N> {
                 total[(i, c)] = total[(c, i)];
             }
         }
-        let products = if lead == k { windows } else { Vec::new() };
-        Gram { total, scores, products, robust_weight: self.robust_weight.clone() }
+        Gram { total, scores, windows: Vec::new(), robust_weight: self.robust_weight.clone() }
     }
 
     /// Cost of every window for a whitened residual, without robust weights.
@@ -316,13 +385,15 @@ impl<const N: usize> Weighting<N> {
     }
 }
 
-/// Derivatives of all predictions by initial positions and velocities, around the initial states displaced by `offsets`.
+/// Derivatives of all predictions by initial positions and velocities, around the initial states displaced by `offsets`; `inputs` are those of the
+/// logs under the hypothesis.
 pub fn initial_state_sensitivities<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     data: &Dataset<N>,
     arm: &A,
     hypothesis: &Hypothesis<P>,
     offsets: &[InitialStateOffset<N>],
     predicted: &[f64],
+    inputs: Option<&LogInputs<N>>,
 ) -> Vec<Vec<f64>> {
     (0..2 * N)
         .into_par_iter()
@@ -339,7 +410,7 @@ pub fn initial_state_sensitivities<A: Arm<f64, N, P>, const N: usize, const P: u
                     moved
                 })
                 .collect();
-            let moved = data.predict(arm, hypothesis, &displaced);
+            let (moved, _) = data.predict_beside(arm, hypothesis, &displaced, inputs);
             moved
                 .iter()
                 .zip(predicted)

@@ -65,6 +65,38 @@ pub fn cross(left: &[&[f64]], right: &[&[f64]]) -> Vec<f64> {
     Level::detect().run(Cross { left, right })
 }
 
+/// Inner products of each column from the one with index `first` on with the columns before it and itself; row by row.
+struct LowerRows<'a> {
+    columns: &'a [&'a [f64]],
+    first: usize,
+}
+
+impl Kernel for LowerRows<'_> {
+    type Output = Vec<f64>;
+
+    #[inline(always)]
+    fn run<C: Cpu>(self) -> Vec<f64> {
+        let count = self.columns.len();
+        let mut products = Vec::with_capacity(count * (count + 1) / 2);
+        for i in self.first..count {
+            let (groups, rest) = self.columns[..=i].as_chunks::<COLUMNS_AT_ONCE>();
+            for group in groups {
+                products.extend(dots::<C, COLUMNS_AT_ONCE>(self.columns[i], *group));
+            }
+            for y in rest {
+                products.extend(dots::<C, 1>(self.columns[i], [y]));
+            }
+        }
+        products
+    }
+}
+
+/// Inner products of each column from the one with index `first` on with the columns before it and itself; row by row, each one longer than the row
+/// before.
+pub fn lower_rows(columns: &[&[f64]], first: usize) -> Vec<f64> {
+    Level::detect().run(LowerRows { columns, first })
+}
+
 /// Two columns whose inner product is computed.
 struct Pair<'a>(&'a [f64], &'a [f64]);
 
@@ -112,6 +144,8 @@ mod tests {
             for (got, expected) in products.iter().zip(expected) {
                 assert!((got - expected).abs() < 1e-13 * (1.0 + n as f64), "{n}: {got} {expected}");
             }
+            let rows = lower_rows(&[&x, &y, &z], 1);
+            assert_eq!(rows, [&cross(&[&y], &[&x, &y])[..], &cross(&[&z], &[&x, &y, &z])].concat());
             assert!((squares(&[&z])[0] - plain(&z, &z)).abs() < 1e-13 * (1.0 + n as f64));
         }
     }

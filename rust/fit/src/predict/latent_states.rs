@@ -37,6 +37,9 @@ pub fn latent_states<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         return beside_measured(track, plant, torque, last);
     }
     let mut now = LatentState::none(path[0].q);
+    let rates: [f64; N] = std::array::from_fn(|j| {
+        plant.drivetrain().get(j).map_or(0.0, |transmission| transmission.rate(f64::MAX))
+    });
     let mut all = Vec::with_capacity(last + 1);
     for k in 0..=last {
         now.memory = plant.memory(&path[k].q, &now);
@@ -51,7 +54,7 @@ pub fn latent_states<A: Arm<f64, N, P>, const N: usize, const P: usize>(
                 let held =
                     transmission.coupling_ratio * transmission.inertia * carried / h.max(f64::MIN_POSITIVE);
                 let torque = torque[k][j].map(|tau| tau - held);
-                let motor_motion = MotorMotion { transmission, torque: &torque, h, ends };
+                let motor_motion = MotorMotion { transmission, rate: rates[j], torque: &torque, h, ends };
                 let (at, rate) =
                     motor_motion.advance(ends[0].0 + now.deflection[j], ends[0].1 + now.deflection_rate[j]);
                 (now.deflection[j], now.deflection_rate[j]) = (at - ends[1].0, rate - ends[1].1);
@@ -185,6 +188,8 @@ fn rigid<A: Arm<f64, N, P>, const N: usize, const P: usize>(
 /// A motor simulated over one sample interval, with known motion of its link.
 struct MotorMotion<'a> {
     transmission: &'a Transmission<f64>,
+    /// Natural frequency of the motor against a link that does not yield, or its damping rate if that is larger, 1/s.
+    rate: f64,
     torque: &'a InputSegment<f64>,
     h: f64,
     /// Position and velocity of the link at the start and the end of the interval.
@@ -238,8 +243,7 @@ impl MotorMotion<'_> {
         drawn: impl Fn(f64) -> D,
         slope: impl Fn(&D, f64, f64) -> f64,
     ) -> (f64, f64) {
-        let count = ((self.h * self.transmission.rate(f64::MAX) / MAX_PHASE_PER_STEP).ceil() as usize)
-            .clamp(1, MAX_STEPS);
+        let count = ((self.h * self.rate / MAX_PHASE_PER_STEP).ceil() as usize).clamp(1, MAX_STEPS);
         let (dt, ds) = (self.h / count as f64, 1.0 / count as f64);
         let (half, sixth) = (0.5 * dt, dt / 6.0);
         let mut here = drawn(0.0);
@@ -277,6 +281,7 @@ mod tests {
             part_of_link: false,
             coupling_ratio: 0.0,
         };
+        let natural = transmission.rate(f64::MAX);
         let (speed, segment) = (0.4, InputSegment::held(torque));
         // Behind a link at constant speed: a motor that starts with it oscillates about the deflection that carries the torque.
         let (mut at, mut velocity) = (0.0, speed);
@@ -284,7 +289,8 @@ mod tests {
             let t = f64::from(k) * h;
             let ends = [(speed * t, speed), (speed * (t + h), speed)];
             (at, velocity) =
-                MotorMotion { transmission: &transmission, torque: &segment, h, ends }.advance(at, velocity);
+                MotorMotion { transmission: &transmission, rate: natural, torque: &segment, h, ends }
+                    .advance(at, velocity);
             let phase = rate * (t + h);
             let deflection = torque / stiffness * (1.0 - phase.cos());
             assert!(

@@ -6,10 +6,9 @@
 use crate::log::cut::cut_at_smooth_motion;
 use crate::log::track::{InitialState, Track};
 use crate::model::hypothesis::Hypothesis;
-use crate::predict::latent_states::latent_states;
+use crate::predict::log_inputs::LogInputs;
 use armgap_core::arm::Arm;
 use armgap_core::cpu::Level;
-use armgap_core::effect::InputSegment;
 use armgap_core::integrate::{Interval, State, StepLimits, advance_in_stable_steps};
 use armgap_core::plant::{Mode, Plant};
 use armgap_core::rollout::{BatchRollout, ElasticRollout, Run, WIDTH};
@@ -145,7 +144,28 @@ impl<const N: usize> Dataset<N> {
         hypothesis: &Hypothesis<P>,
         offsets: &[InitialStateOffset<N>],
     ) -> Vec<f64> {
-        self.predict_by::<SideBySide, A, P>(arm, hypothesis, offsets)
+        self.predict_beside(arm, hypothesis, offsets, None).0
+    }
+
+    /// Predicted positions of all windows, rad or m, and the inputs of the logs that the predictions were made with; inputs that do not differ from
+    /// those `known` of another hypothesis are not computed again. No inputs for a hypothesis that cannot be simulated.
+    pub(crate) fn predict_beside<A: Arm<f64, N, P>, const P: usize>(
+        &self,
+        arm: &A,
+        hypothesis: &Hypothesis<P>,
+        offsets: &[InitialStateOffset<N>],
+        known: Option<&LogInputs<N>>,
+    ) -> (Vec<f64>, Option<LogInputs<N>>) {
+        self.predict_by::<SideBySide, A, P>(arm, hypothesis, offsets, known)
+    }
+
+    /// Inputs of the logs under a hypothesis; none if it cannot be simulated.
+    pub(crate) fn log_inputs<A: Arm<f64, N, P>, const P: usize>(
+        &self,
+        arm: &A,
+        hypothesis: &Hypothesis<P>,
+    ) -> Option<LogInputs<N>> {
+        Some(LogInputs::new(self, hypothesis, &hypothesis.plant(arm)?, None))
     }
 
     /// Predicted positions of all windows, rad or m, one rollout at a time: for arms whose long equation of motion gains nothing from vector lanes.
@@ -154,26 +174,22 @@ impl<const N: usize> Dataset<N> {
         arm: &A,
         hypothesis: &Hypothesis<P>,
     ) -> Vec<f64> {
-        self.predict_by::<Singly, A, P>(arm, hypothesis, &self.zero_offsets())
+        self.predict_by::<Singly, A, P>(arm, hypothesis, &self.zero_offsets(), None).0
     }
 
-    /// Predicted positions of all windows, rad or m, with the rollouts simulated by the method `R`.
+    /// Predicted positions of all windows, rad or m, with the rollouts simulated by the method `R`, and the inputs of the logs.
     fn predict_by<R: Rollouts, A: Arm<f64, N, P>, const P: usize>(
         &self,
         arm: &A,
         hypothesis: &Hypothesis<P>,
         offsets: &[InitialStateOffset<N>],
-    ) -> Vec<f64> {
+        known: Option<&LogInputs<N>>,
+    ) -> (Vec<f64>, Option<LogInputs<N>>) {
         let mut predicted = vec![DIVERGED; self.rows * N];
         let Some(plant) = hypothesis.plant(arm) else {
-            return predicted;
+            return (predicted, None);
         };
-        let commands: Vec<_> = self
-            .tracks
-            .iter()
-            .map(|track| hypothesis.command(&track.t, &track.held, &track.pushes, &track.tables))
-            .collect();
-        let latent = self.latent(&plant, &commands);
+        let inputs = LogInputs::new(self, hypothesis, &plant, known);
         let (mut batched, mut elastic, mut scalar) =
             (Vec::with_capacity(self.windows.len()), Vec::new(), Vec::new());
         let mut rest = predicted.as_mut_slice();
@@ -181,10 +197,10 @@ impl<const N: usize> Dataset<N> {
             let (positions, after) = rest.split_at_mut(window.rows() * N);
             rest = after;
             let track = &self.tracks[window.track];
-            let torque = commands[window.track].as_deref().unwrap_or(&track.held);
+            let torque = inputs.torques(window.track, track);
             let shown = window.initial_state.q + shift.q - shift.zero;
             let mut state = hypothesis.initial_state(shown, window.initial_state.dq + shift.dq);
-            if let Some(states) = &latent[window.track] {
+            if let Some(states) = inputs.latent(window.track) {
                 enter(&plant, &mut state, &states[window.first]);
             }
             let (t, torque) = (&track.t[window.first..=window.last], &torque[window.first..window.last]);
@@ -218,7 +234,7 @@ impl<const N: usize> Dataset<N> {
                 }
             }
         }
-        predicted
+        (predicted, Some(inputs))
     }
 
     /// Whether a joint comes close to a position at which its torque jumps, such as a joint limit, in the measured motion of a window.
@@ -234,23 +250,6 @@ impl<const N: usize> Dataset<N> {
             let margin = NEAR_EDGE * (high - low);
             plant.edges(j).any(|edge| (low - margin..=high + margin).contains(&edge.position))
         })
-    }
-
-    /// Latent states at every track's samples, up to the start of its last window; `None` for a plant without latent states.
-    fn latent<A: Arm<f64, N, P>, const P: usize>(
-        &self,
-        plant: &Plant<f64, A, N, P>,
-        commands: &[Option<Vec<[InputSegment<f64>; N]>>],
-    ) -> Vec<Option<Vec<LatentState<f64, N>>>> {
-        let of = |(index, track): (usize, &Track<N>)| {
-            let last = self.windows.iter().filter(|w| w.track == index).map(|w| w.first).max()?;
-            if !plant.has_latent_states() {
-                return None;
-            }
-            let torque = commands[index].as_deref().unwrap_or(&track.held);
-            Some(latent_states(track, plant, torque, last))
-        };
-        self.tracks.iter().enumerate().map(of).collect()
     }
 }
 

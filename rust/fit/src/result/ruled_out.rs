@@ -34,7 +34,8 @@ pub fn ruled_out<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     let unchanged = model.effects.len() == node.settled.hypothesis.effects.len()
         && model.values() == node.settled.hypothesis.values();
     let known = node.screened.get(..open.len()).filter(|_| unchanged);
-    let scored = known.map_or_else(|| screen(&problem, model, &open), <[ScoreTest]>::to_vec);
+    let tested = || screen(&problem, model, &problem.jacobian(model), &open);
+    let scored = known.map_or_else(tested, <[ScoreTest]>::to_vec);
     let remains = problem.weighting.total(&problem.raw_costs(model));
     let unexplained = node.is_open() || in_training;
     let mut list: Vec<(EffectInstance, RuledOut)> = Vec::new();

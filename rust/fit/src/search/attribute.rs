@@ -1,8 +1,10 @@
 //! One node (step) of the model search: candidate effects are screened by score tests, those that pass are fitted in full, and the holdout decides.
 
+use crate::candidates::initial_guess::Screening;
 use crate::candidates::screen::ScoreTest;
 use crate::likelihood::context::{DiagnosisContext, SplitWeighting};
-use crate::likelihood::holdout::CONSEQUENTIAL_ERROR;
+use crate::likelihood::holdout::{CONSEQUENTIAL_ERROR, is_plausible};
+use crate::likelihood::jacobian::Sensitivities;
 use crate::likelihood::scale::Scales;
 use crate::likelihood::solve::{Effort, Fit};
 use crate::model::hypothesis::{EffectInstance, Hypothesis};
@@ -185,27 +187,38 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
 
     /// The search node around a fit under window weights of its own residual; candidates are fitted to a gap only if it is larger than
     /// `min_relevance` (RMS, relative to the motion within a window).
-    pub fn node_around(
+    pub fn node_around(&self, settled: (Fit<P>, SplitWeighting<N>), min_relevance: f64) -> SearchNode<N, P> {
+        self.node_screened(settled, min_relevance, None)
+    }
+
+    /// The search node around a fit as `node_around` gives it, from the score tests `screening` around this fit if they are known.
+    pub(crate) fn node_screened(
         &self,
         (fit, weights): (Fit<P>, SplitWeighting<N>),
         min_relevance: f64,
+        screening: Option<Screening<N>>,
     ) -> SearchNode<N, P> {
         let size = self.relative_gap(&weights, &fit);
-        let (mut initial_guesses, screened) = self.initial_guesses(&fit, &weights, size, min_relevance);
         let gap = size > min_relevance;
-        let problem = self.problem(&weights.training);
-        let needed = gap || !initial_guesses.is_empty();
-        let jacobian = if needed { problem.jacobian(&fit.hypothesis) } else { Vec::new() };
-        if gap {
-            initial_guesses.extend(self.regularisation_guesses(&fit.hypothesis, &weights, &jacobian));
+        let is_wanted = gap || !is_plausible::<P>(fit.prior_cost);
+        let screening = is_wanted.then(|| screening.unwrap_or_else(|| self.screened(&fit, &weights)));
+        let mut initial_guesses = Vec::new();
+        if let Some(screening) = &screening {
+            initial_guesses = self.initial_guesses(&fit, &weights, screening, size, min_relevance);
         }
+        if let Some(screening) = screening.as_ref().filter(|_| gap) {
+            let more = self.regularisation_guesses(&fit.hypothesis, &weights, &screening.jacobian);
+            initial_guesses.extend(more);
+        }
+        let jacobian = screening.as_ref().map(|screening| &screening.jacobian);
         self.progress.begin(Phase::Candidates, initial_guesses.len());
-        let first = self.fit_candidates(&weights, &fit.hypothesis, initial_guesses, Effort::ROUGH, &jacobian);
+        let first = self.fit_candidates(&weights, &fit.hypothesis, initial_guesses, Effort::ROUGH, jacobian);
         let first = self.taken_on(&weights, &fit.hypothesis, first);
         let field = self.field(&weights, &fit, &first);
         self.progress.begin(Phase::Finalists, 2 * FINALISTS + MAX_REWEIGHTINGS);
         let final_round = self.final_round(&fit.hypothesis, first, &weights);
-        let screened = if final_round.weights.is_none() { screened } else { Vec::new() };
+        let tests = screening.map_or_else(Vec::new, |screening| screening.tests);
+        let screened = if final_round.weights.is_none() { tests } else { Vec::new() };
         let FinalRound { base, candidates, weights: heavier } = final_round;
         let weights = heavier.unwrap_or(weights);
         let floor = self.floor(&weights);
@@ -234,14 +247,14 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     }
 
     /// Candidates fitted from all initial guesses and judged on the holdout, lowest cost first, without those that diverged or whose effect vanished;
-    /// `jacobian` is that of the model `base` that the guesses extend, empty where it is not known.
+    /// `jacobian` is that of the model `base` that the guesses extend, if it is known.
     pub(crate) fn fit_candidates(
         &self,
         weights: &SplitWeighting<N>,
         base: &Hypothesis<P>,
         initial_guesses: Vec<Hypothesis<P>>,
         effort: Effort,
-        jacobian: &[Vec<f64>],
+        jacobian: Option<&Sensitivities<N>>,
     ) -> Vec<Candidate<P>> {
         let known = base.effects.len();
         let fitted =
@@ -260,7 +273,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let known = base.effects.len();
         let on = |(i, c): (usize, Candidate<P>)| {
             let done = c.fit.own_jacobian || i >= TAKEN_ON;
-            if done { c } else { self.candidate(weights, &c.fit.hypothesis, known, Effort::ROUGH, &[]) }
+            if done { c } else { self.candidate(weights, &c.fit.hypothesis, known, Effort::ROUGH, None) }
         };
         ranked(candidates.into_par_iter().enumerate().map(on).collect())
     }
@@ -273,11 +286,11 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         initial_guess: &Hypothesis<P>,
         known: usize,
         effort: Effort,
-        jacobian: &[Vec<f64>],
+        jacobian: Option<&Sensitivities<N>>,
     ) -> Candidate<P> {
         // Where the effect under test is near its neutral value, the Jacobian of the model without the effect is nearly that of the model with it.
         let near = initial_guess.effects.get(known).is_some_and(|e| e.law.spec().trial != Trial::Whole);
-        let jacobian = if near { jacobian } else { &[] };
+        let jacobian = jacobian.filter(|_| near);
         let fit = self.problem(&weights.training).solve_reusing(initial_guess, effort, jacobian);
         let training = fit.costs.iter().map(|cost| weights.training.student_t_cost(*cost)).collect();
         let (holdout, error) = self.judged_on_holdout(weights, &fit);
@@ -313,9 +326,9 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
                     .extend(candidates.first().into_iter().flat_map(|c| self.other_sides(c, weights)));
             }
             let effort = if last { Effort::FULL } else { Effort::ROUGH };
-            let base = || self.candidate(weights, current, current.effects.len(), effort, &[]);
+            let base = || self.candidate(weights, current, current.effects.len(), effort, None);
             let (fitted, base) =
-                rayon::join(|| self.fit_candidates(weights, current, initial_guesses, effort, &[]), base);
+                rayon::join(|| self.fit_candidates(weights, current, initial_guesses, effort, None), base);
             candidates = fitted;
             if last {
                 return FinalRound { base, candidates, weights: heavier };
@@ -324,7 +337,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             hopeless = candidates.first().map_or(base, |best| 0.5 * (base + best.score()));
         }
         let weights = heavier.as_ref().unwrap_or(given);
-        let base = self.candidate(weights, current, current.effects.len(), Effort::FULL, &[]);
+        let base = self.candidate(weights, current, current.effects.len(), Effort::FULL, None);
         FinalRound { base, candidates, weights: heavier }
     }
 

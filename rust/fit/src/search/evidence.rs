@@ -15,6 +15,7 @@ use crate::search::attribute::SearchNode;
 use crate::search::model_search::Attribution;
 use armgap_core::arm::Arm;
 use armgap_core::effect::Trial;
+use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -105,14 +106,15 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         if attribution.causes.is_empty() {
             return;
         }
-        let (model, on_holdout) = (&attribution.model, &attribution.on_holdout);
+        let Attribution { model, on_holdout, causes, .. } = attribution;
+        let (model, on_holdout) = (&*model, &*on_holdout);
         let per_window = |fit: &Fit<P>| self.judged_on_holdout(&last.weights, fit).0;
         let full = per_window(model).iter().sum::<f64>();
         let rest = is_more_than_noise(last).then_some(full - last.floor).filter(|rest| *rest > 0.0);
-        for cause in &mut attribution.causes {
+        causes.par_iter_mut().for_each(|cause| {
             let Some(place) = model.hypothesis.effects.iter().position(|e| e.same_place(&cause.effect))
             else {
-                continue;
+                return;
             };
             if let Some(rest) = rest {
                 let mut taken_out = model.hypothesis.clone();
@@ -137,7 +139,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             if cause.ground == Ground::Motion {
                 cause.probability = cause.evidence.probability();
             }
-        }
+        });
     }
 }
 

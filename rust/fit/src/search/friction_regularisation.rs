@@ -6,6 +6,7 @@
 //! cause that is to stay.
 
 use crate::likelihood::context::{DiagnosisContext, SplitWeighting};
+use crate::likelihood::jacobian::Sensitivities;
 use crate::likelihood::solve::{Effort, Fit, FitProblem};
 use crate::model::hypothesis::Hypothesis;
 use crate::numeric::minimum::minimum;
@@ -119,7 +120,7 @@ fn narrowest_widths<A: Arm<f64, N, P>, const N: usize, const P: usize>(
 fn with_widths<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     problem: &FitProblem<A, N, P>,
     model: &Hypothesis<P>,
-    jacobian: &[Vec<f64>],
+    jacobian: &Sensitivities<N>,
     search: impl Fn(&dyn Fn([f64; N]) -> f64, [f64; N]) -> Option<Widths<N>>,
 ) -> Option<Hypothesis<P>> {
     let narrowest = narrowest_widths(problem, model)?;
@@ -136,7 +137,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         &self,
         problem: &FitProblem<A, N, P>,
         model: &Hypothesis<P>,
-        jacobian: &[Vec<f64>],
+        jacobian: &Sensitivities<N>,
     ) -> Option<Hypothesis<P>> {
         let tried = RELATIVE_WIDTHS.map(|part| part * self.scales.slowest());
         let search =
@@ -150,7 +151,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         &self,
         model: &Hypothesis<P>,
         weights: &SplitWeighting<N>,
-        jacobian: &[Vec<f64>],
+        jacobian: &Sensitivities<N>,
     ) -> Vec<Hypothesis<P>> {
         let regularised = self.with_best_widths(&self.problem(&weights.training), model, jacobian);
         let exact = model.is_rounded().then(|| model.rounded_over([0.0; N]));
@@ -179,7 +180,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let problem = self.problem(&node.weights.training);
         let model = &node.base.fit.hypothesis;
         let regularised = self.with_best_widths(&problem, model, &problem.jacobian(model))?;
-        let found = self.candidate(&node.weights, &regularised, model.effects.len(), Effort::FULL, &[]);
+        let found = self.candidate(&node.weights, &regularised, model.effects.len(), Effort::FULL, None);
         let best = self.with_widths_refined(node, found);
         is_regularisation(node, &best).then_some(best.fit)
     }
@@ -197,7 +198,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             let own = std::array::from_fn(|j| model.rounding[j]);
             let near = |cost: &dyn Fn([f64; N]) -> f64, _| Some(refined_widths(cost, own));
             let Some(refined) = with_widths(&problem, model, &problem.jacobian(model), near) else { break };
-            let found = self.candidate(&node.weights, &refined, model.effects.len(), Effort::FULL, &[]);
+            let found = self.candidate(&node.weights, &refined, model.effects.len(), Effort::FULL, None);
             if cost(&found) >= cost(&best) {
                 break;
             }

@@ -16,6 +16,7 @@ use crate::search::evidence::Evidence;
 use crate::search::model_search::{ModelSearch, added};
 use crate::search::rivals::equivalent;
 use armgap_core::arm::Arm;
+use rayon::prelude::*;
 
 /// Least share of the gap that a rival must remove at the search node where a cause was added, relative to the share that the cause removes.
 const RIVALS: f64 = 0.5;
@@ -110,10 +111,10 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         }
         let beside = |effects: Vec<EffectInstance>| {
             let start = Hypothesis { effects, ..model.clone() };
-            self.candidate(&last.weights, &start, place, Effort::FULL, &[])
+            self.candidate(&last.weights, &start, place, Effort::FULL, None)
         };
         let full = beside(model.effects.clone());
-        let tried = rivals.into_iter().filter_map(|rival| {
+        let tried = rivals.into_par_iter().filter_map(|rival| {
             let mut effects = model.effects.clone();
             effects[place] = rival.effect?;
             let swapped = beside(effects);
@@ -142,7 +143,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let added = node.settled.hypothesis.effects.len();
         let choice = node.candidates.iter().position(|c| c.is_same(&rival.fitted)).unwrap_or_else(|| {
             let start = &rival.fitted.fit.hypothesis;
-            node.candidates.push(self.candidate(&node.weights, start, added, Effort::FULL, &[]));
+            node.candidates.push(self.candidate(&node.weights, start, added, Effort::FULL, None));
             node.candidates.len() - 1
         });
         let before = &node.settled.hypothesis;

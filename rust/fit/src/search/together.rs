@@ -76,14 +76,15 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let (fit, weights) = self.settle(&first.fit.hypothesis, alone.weights.training.scale);
         // Share of the gap left by `first` that a second effect must remove for the two to remove `NEARLY_ALL` of the whole gap.
         let needed = 1.0 - (1.0 - NEARLY_ALL) / (1.0 - alone.share(first)).max(1e-9);
-        if self.largest_gain(&fit, &weights) < PROMISED_DECREASE * needed {
+        let screening = self.screened(&fit, &weights);
+        if self.largest_gain(&fit, &weights, &screening) < PROMISED_DECREASE * needed {
             return None;
         }
-        let node = self.node_around((fit, weights), min_relevance);
+        let node = self.node_screened((fit, weights), min_relevance, Some(screening));
         let (choice, ground) = choose(&node, true, min_relevance)?;
         let pair = &node.candidates[choice];
         let none = &alone.settled.hypothesis;
-        let base = self.candidate(&node.weights, none, none.effects.len(), Effort::FULL, &[]);
+        let base = self.candidate(&node.weights, none, none.effects.len(), Effort::FULL, None);
         let whole = SearchNode {
             settled: alone.settled.clone(),
             base,

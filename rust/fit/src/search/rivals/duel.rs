@@ -19,8 +19,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     pub(crate) fn duel(&self, node: SearchNode<N, P>) -> SearchNode<N, P> {
         let Some((best, rival)) = close_pair(&node) else { return node };
         let current = node.settled.hypothesis.clone();
-        let own = self.around(&current, &node, best);
-        let other = self.around(&current, &node, rival);
+        let (own, other) =
+            rayon::join(|| self.around(&current, &node, best), || self.around(&current, &node, rival));
         if lead(&other) > lead(&own) { other } else { own }
     }
 
@@ -29,8 +29,10 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let chosen = &node.candidates[one].fit.hypothesis;
         let (_, weights) = self.settle(chosen, node.weights.training.scale);
         let initial_guesses = node.candidates.iter().map(|c| c.fit.hypothesis.clone()).collect();
-        let candidates = self.fit_candidates(&weights, current, initial_guesses, Effort::FULL, &[]);
-        let base = self.candidate(&weights, current, current.effects.len(), Effort::FULL, &[]);
+        let (candidates, base) = rayon::join(
+            || self.fit_candidates(&weights, current, initial_guesses, Effort::FULL, None),
+            || self.candidate(&weights, current, current.effects.len(), Effort::FULL, None),
+        );
         let (settled, field) = (node.settled.clone(), node.field.clone());
         let (floor, motion) = (self.floor(&weights), self.motion(&weights));
         SearchNode { settled, base, candidates, field, screened: Vec::new(), weights, floor, motion }
