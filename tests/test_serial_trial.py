@@ -21,10 +21,21 @@ from armgap.arm import controller  # noqa: E402
 from armgap.arm.rigid_body import inconsistency  # noqa: E402
 from serial_trial import arms, motion  # noqa: E402
 from serial_trial.arms import FAMILIES, STEP, SerialRobot, draw_robot, perturbed  # noqa: E402
-from serial_trial.case import LEAST, NULLS, OFF, TRUST, effect_of, hidden_effect, make_case, sigma_of  # noqa: E402
-from serial_trial.effects import EFFECTS, Effect, Moment, Null  # noqa: E402
+from serial_trial.case import (  # noqa: E402
+    CLUTTERS,
+    LEAST,
+    NULLS,
+    OFF,
+    OUTSIDES,
+    TRUST,
+    effect_of,
+    hidden_effect,
+    make_case,
+    sigma_of,
+)
+from serial_trial.effects import BESIDE, EFFECTS, OUTSIDE, Clutter, Effect, Moment, Null  # noqa: E402
 from serial_trial.motion import SERVOS, Controller, Reference, Run, draw_controller, draw_reference, simulate, use_of  # noqa: E402
-from serial_trial.run import OUTCOMES, ask, outcome, report  # noqa: E402
+from serial_trial.run import OUTCOMES, ask, is_in_arm, outcome, report  # noqa: E402
 from serial_trial.servo import COMMANDED  # noqa: E402
 from serial_trial.visibility import MULTIPLE, SIGMAS, links, visibility  # noqa: E402
 
@@ -235,10 +246,14 @@ def test_the_truth_is_within_the_prior_and_can_exist(seed) -> None:
         assert not any(inconsistency(link.ten) for link in (*arm.links, *truth.links))
 
 
-@pytest.mark.parametrize("name", list(EFFECTS))
+#: Classes of all effects by name, with those that the library does not have.
+ALL = EFFECTS | {effect.name: effect for effect in OUTSIDE}
+
+
+@pytest.mark.parametrize("name", [name for name in ALL if name != "friction_jump"])  # it acts after the log's end
 def test_an_effect_changes_the_joint_that_it_names(robot, clean, name) -> None:
     rng = np.random.default_rng(2)
-    kind = EFFECTS[name]
+    kind = ALL[name]
     hidden = kind.draw(robot, 1 if kind.per_joint else None, 0.2, use_of(clean), rng)
     there = moved(robot, 1, hidden, hidden.changed(hidden.without(robot)))
     bare = hidden.without(robot)
@@ -253,11 +268,11 @@ def test_an_effect_changes_the_joint_that_it_names(robot, clean, name) -> None:
             assert np.argmax(differ) == 1
 
 
-@pytest.mark.parametrize("name", [n for n, e in EFFECTS.items() if e.per_joint and n not in OF_THE_ARM])
+@pytest.mark.parametrize("name", [n for n, e in ALL.items() if e.per_joint and n not in OF_THE_ARM])
 def test_an_effect_acts_on_its_joint_alone(robot, clean, name) -> None:
     """Every hook of an effect, at states and commands all over, touches no other joint."""
     rng = np.random.default_rng(4)
-    hidden = EFFECTS[name].draw(robot, 2, 0.2, use_of(clean), rng)
+    hidden = ALL[name].draw(robot, 2, 0.2, use_of(clean), rng)
     hidden.begin(rng.normal(size=robot.n))
     touched = np.zeros(robot.n)
     for _ in range(200):
@@ -269,6 +284,47 @@ def test_an_effect_acts_on_its_joint_alone(robot, clean, name) -> None:
             touched += 0.0 if more is None else np.abs(more)
     touched += np.abs(hidden.changed(robot).rotor - robot.rotor) + np.abs(hidden.without(robot).rotor - robot.rotor)
     assert np.array_equal(np.flatnonzero(touched), [2])
+
+
+def test_clutter_does_what_its_members_do(robot, clean) -> None:
+    rng = np.random.default_rng(5)
+    members = [
+        EFFECTS[name].draw(robot, j, 0.2, use_of(clean), rng) for j, name in enumerate(("torque_gain", "stribeck"))
+    ]
+    members += [EFFECTS["encoder_offset"].draw(robot, 2, 0.2, use_of(clean), rng)]
+    clutter = Clutter(0, members[0], members[1:])
+    q, dq, command, load = rng.normal(size=(4, robot.n))
+    now = Moment(1.0, q, dq, command, load)
+    clutter.begin(command)
+    assert np.array_equal(clutter.drive(command), members[0].drive(command))
+    assert np.array_equal(clutter.dry(now), members[1].dry(now))
+    assert np.array_equal(clutter.reading(q), members[2].reading(q))
+    assert clutter.torque(now) is None
+    assert clutter.values == members[0].values
+
+
+def test_a_case_with_clutter_has_smaller_effects_beside_the_hidden_one() -> None:
+    case = make_case(3, CLUTTERS, duration=3.0)
+    assert 2 <= len(case.key["beside"]) <= 4
+    assert {effect["effect"] for effect in case.key["beside"]} <= {kind.name for kind in BESIDE}
+    assert all(1 <= effect["joint"] <= case.key["joints"] for effect in case.key["beside"])
+    assert make_case(3, OUTSIDES, duration=3.0).key["outside"]
+    assert {effect_of(3, OUTSIDES + i) for i in range(len(OUTSIDE))} == {effect.name for effect in OUTSIDE}
+
+
+def test_a_name_is_right_if_it_or_a_look_alike_is_hidden_anywhere_in_the_arm() -> None:
+    effect = {"effect": "stribeck", "joint": 2, "outside": False, "values": {}}
+    drift = {"effect": "torque_drift", "joint": 1, "outside": True, "values": {}}
+    record = {"effect": "payload", "joint": None, "outside": False, "values": {}, "beside": [effect, drift]}
+
+    def name(effect: str, joint: int | None, *alike: tuple[str, int]) -> dict[str, object]:
+        return {"effect": effect, "joint": joint, "equivalents": [{"effect": e, "joint": j} for e, j in alike]}
+
+    assert is_in_arm(record, name("stribeck", 2))
+    assert is_in_arm(record, name("payload", None))
+    assert is_in_arm(record, name("presliding", 2, ("stribeck", 2)))
+    assert not is_in_arm(record, name("stribeck", 1))
+    assert not is_in_arm(record, name("torque_drift", 1))
 
 
 @pytest.mark.parametrize("name", list(VALUES))
@@ -347,7 +403,7 @@ def record(effect: str, joint: int | None, causes: list[tuple[str, int | None]],
     }
     return {
         "effect": effect, "joint": joint, "joints": 3, "values": {}, "outside": False, "causes": named, "candidates": [], "verdict": "effect",
-        "seconds": 1.0, **made, **more,
+        "seconds": 1.0, "beside": [], "unnamed": [], **made, **more,
     }  # fmt: skip
 
 
