@@ -105,6 +105,15 @@ def test_a_serial_arm_without_a_cause_is_told_what_was_not_tested() -> None:
     assert answer.endswith(f"not tested: {title('external_pulse')}, {title('backlash')}.")
 
 
+def test_what_the_rest_depends_on_is_said_where_no_cause_is_named() -> None:
+    data = copy.deepcopy(cases.unexplained().to_dict())
+    data["unnamed"] = [{"joint": 1, "variable": "t"}, {"joint": 2, "variable": "dq1"}]
+    depends = "What stays depends on time (joint 1), speed of joint 1 (joint 2)."
+    assert any(a.detail.endswith(depends) for a in answers(data))
+    data["verdict"] = "parameters"
+    assert not any(depends in a.detail for a in answers(data))
+
+
 def test_a_doubtful_cause_is_called_so() -> None:
     data = copy.deepcopy(cases.named().to_dict())
     data["causes"][0]["probability"] = 0.3

@@ -68,7 +68,6 @@ _NO_CAUSE = {
     ),
     "input": ("None is named", "While the input contradicts itself, any effect would only imitate the contradiction."),
 }
-_NONE_TESTED = "None that was tested"
 #: First words of the reason of effects that a diagnosis of a serial arm does not test.
 _NOT_TESTED = "not tested on serial arms"
 _NONE_ALLOWED = (
@@ -421,9 +420,12 @@ def _which(data: Data) -> tuple[str, str]:
     if not causes and none_allowed(data):
         return _NONE_ALLOWED
     if not causes:
+        headline, text = _NO_CAUSE.get(data["verdict"], ("No cause was named", ""))
         if data["verdict"] == "unexplained" and (data.get("arm") or {}).get("kind") == SERIAL:
-            return _NONE_TESTED, _untested(data)
-        return _NO_CAUSE.get(data["verdict"], ("No cause was named", ""))
+            headline, text = "None that was tested", _untested(data)
+        depends = ", ".join(f"{symbol_text(d['variable'])} (joint {d['joint']})" for d in data.get("unnamed") or [])
+        is_listed = depends and data["verdict"] == "unexplained"
+        return headline, f"{text} What stays depends on {depends}." if is_listed else text
     headline = _capital(" and ".join(_counted([f"{title(c['effect'])}, {place_text(c)}" for c in causes])))
     text = " ".join(_about(cause, alone=len(causes) == 1) for cause in causes)
     if doubtful(data):

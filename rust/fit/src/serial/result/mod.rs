@@ -106,7 +106,7 @@ pub(crate) fn assemble<const N: usize, const P: usize>(
         floor: &gap.floor,
         motion: &gap.motion,
     };
-    let verdict = evidence.verdict();
+    let (verdict, remains) = (evidence.verdict(), evidence.remains());
     let parameters = |theta: &[f64], sigma: &[f64]| values(description, theta, sigma);
     let (free_run_series, free_run) = free_runs(&compared, data);
     gap.free_run = free_run;
@@ -133,7 +133,7 @@ pub(crate) fn assemble<const N: usize, const P: usize>(
         ranking: Vec::new(),
         stages: Vec::new(),
         regimes: Vec::new(),
-        unnamed: found.unnamed.clone(),
+        unnamed: if remains { found.unnamed.clone() } else { Vec::new() },
         series: window_series(data, &compared.measured, compared.predicted.each_ref().map(Vec::as_slice)),
         free_run_series,
         noise: Noise {
