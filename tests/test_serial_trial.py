@@ -303,7 +303,7 @@ def test_clutter_does_what_its_members_do(robot, clean) -> None:
     assert clutter.values == members[0].values
 
 
-def test_a_case_with_clutter_has_smaller_effects_beside_the_hidden_one() -> None:
+def test_a_case_with_clutter_has_other_effects_beside_the_hidden_one() -> None:
     case = make_case(3, CLUTTERS, duration=3.0)
     assert 2 <= len(case.key["beside"]) <= 4
     assert {effect["effect"] for effect in case.key["beside"]} <= {kind.name for kind in BESIDE}

@@ -122,7 +122,7 @@ def report(records: list[Record]) -> str:
     for label, of in (("no effect", nulls), ("effects outside the library", outside)):
         if of:
             named = [r for r in of if r["causes"]]
-            sure = sum(r["causes"][0]["probability"] >= 0.5 for r in named)
+            sure = sum(any(c["probability"] >= 0.5 for c in r["causes"]) for r in named)
             lines.append(
                 f"{label}: {len(named)} of {len(of)} with a cause named, {sure} of them at a probability of 0.5 or more"
             )

@@ -183,7 +183,7 @@ class SlewLimit(Effect):
 
     @classmethod
     def draw(cls, robot, joint, share, use, rng):
-        return cls(joint, float(use.slew[joint]) * float(rng.uniform(0.4, 1.2)))
+        return cls(joint, float(use.slew[joint]) * (1.2 - min(3.0 * share, 0.8)))
 
     def begin(self, command):
         self._torque = float(command[self.joint])

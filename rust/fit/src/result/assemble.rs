@@ -84,7 +84,7 @@ pub fn assemble<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         if remains { context.laws_beside(&headline.model, &headline.weights, rotary) } else { Vec::new() };
     let sanity = sanity(description.kind, &estimates(&headline.model, description), remains);
     let mut notes = notes(headline, options.max_causes, remains, &sanity, &gap, description);
-    notes.extend(gap.training.as_ref().map(|found| remark(found, gap.unit)));
+    notes.extend(gap.training.as_ref().map(|found| remark(found, &[rotary; N])));
     Diagnosis {
         schema: "armgap.diagnosis/1",
         verdict,

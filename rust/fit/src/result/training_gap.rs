@@ -30,12 +30,12 @@ pub fn training_gap<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     stands_out(&after, &floor, &motion).then_some(TrainingErrors { after, floor })
 }
 
-/// Remark on a gap of the training logs; `unit` is rad or m.
-pub fn remark(found: &TrainingErrors, unit: &str) -> String {
-    let list =
-        |values: &[f64]| values.iter().map(|x| format!("{:.3}", x * 1e3)).collect::<Vec<_>>().join(" and ");
+/// Remark on a gap of the training logs; `rotary` is whether each joint is rotary.
+pub fn remark(found: &TrainingErrors, rotary: &[bool]) -> String {
+    let text = |(x, rotary): (&f64, &bool)| format!("{:.3} m{}", x * 1e3, if *rotary { "rad" } else { "m" });
+    let list = |values: &[f64]| values.iter().zip(rotary).map(text).collect::<Vec<_>>().join(", ");
     format!(
-        "the training logs show a gap that the holdout does not: {} m{unit} by joint, where a perfect model would miss by {}; an effect may act \
+        "the training logs show a gap that the holdout does not: {} by joint, where a perfect model would miss by {}; an effect may act \
          where only they went, or a disturbance in them. Exchange training and holdout logs, or let both hold all motions",
         list(&found.after),
         list(&found.floor)

@@ -68,9 +68,10 @@ fn named_values(term: &Term, sigma: &[f64], rotary: &[bool]) -> Named<Value> {
             _ => (p.name.to_owned(), Value { value: term.p[i], sigma, unit: p.unit }),
         }
     };
+    let finite: Vec<f64> = sigma.iter().map(|s| if s.is_finite() { *s } else { 0.0 }).collect();
     let mut values: Named<Value> = parameters.iter().enumerate().map(value).collect();
     if let TermKind::Transmission(_) = term.kind
-        && let Some([damping, sigma]) = TransmissionLaw::damping(&term.p, sigma)
+        && let Some([damping, sigma]) = TransmissionLaw::damping(&term.p, &finite)
     {
         let unit = if rotary_of(term, rotary) { "N m s/rad" } else { "N s/m" };
         values.remove("lag");

@@ -12,11 +12,12 @@ use crate::predict::window::Dataset;
 use crate::progress::{Phase, ProgressReporter};
 use crate::result::gap::{HORIZONS, closed, free_run_series, limited, whole, window_series};
 use crate::result::report::{
-    ArmSummary, AtHorizon, Candidate, Diagnosis, FreeRun, FreeRunSeries, Gap, LogSummary, Named, Noise,
-    OptionSummary, Parameters, TrainingErrors, Value,
+    ArmSummary, AtHorizon, Candidate, Cause, Diagnosis, FreeRun, FreeRunSeries, Gap, LogSummary, Named,
+    Noise, OptionSummary, Parameters, TrainingErrors, Value,
 };
 use crate::result::training_gap::remark;
 use crate::result::verdict::{Evidence, stands_out};
+use crate::serial::controller::PositionController;
 use crate::serial::controller::closed_loop::ClosedLoop;
 use crate::serial::predict::{Model, floor};
 use crate::serial::result::cause_report::{cause, ruled_out};
@@ -32,8 +33,8 @@ const PREDICTS_WORSE: &str =
     "the arm with what was found predicts the holdout worse than the re-estimated arm does without it";
 
 /// Note on predictions that are worse with the causes found than without, where causes have states that no log holds.
-const HIDDEN_STATES: &str = "predictions and parameters are those of the re-estimated arm without the causes: with an elastic joint or backlash predictions miss more here, \
-     as the deflections at their starts are not in the logs. The causes rest on the torques";
+const HIDDEN_STATES: &str = "with the causes predictions miss more than without them: they start from deflections of the \
+     elastic joint or backlash that are estimated, not measured, and may be wrong. The causes rest on the torques";
 
 /// Number of bootstrap resamples of the holdout's windows for the confidence interval of the closed share.
 const CLOSED_SHARE_RESAMPLES: usize = 500;
@@ -70,20 +71,17 @@ pub(crate) fn assemble<const N: usize, const P: usize>(
     let measured = data.measured();
     let floor: Vec<f64> = floor(data, &noise).iter().map(|v| v.sqrt()).collect();
     let missed = |i: usize| rms::<N>(&measured, &limited(&measured, &predicted[i]));
-    let contradicted = closed(&missed(1), &missed(2), &floor) < 0.0;
-    // Deflections at the windows' starts are not measured: beside elastic joints and backlash, predictions say little about the causes.
-    let hidden = found.reported.terms.iter().any(|term| term.own_motor().is_some());
-    let why_not = |n: &search::Named| {
-        n.unfit(&rotary).or_else(|| (contradicted && !hidden).then(|| PREDICTS_WORSE.to_owned()))
+    let is_worse = |errors: &[f64]| closed(&missed(1), errors, &floor) < 0.0;
+    let worse = is_worse(&missed(2));
+    // Deflections of elastic joints and backlash are not measured, so that predictions say little about these causes; they still judge the others.
+    let (hidden, others): (Vec<Term>, Vec<Term>) =
+        found.reported.terms.iter().cloned().partition(|term| !term.own_motors().is_empty());
+    let others_are_worse = || {
+        let model = model_of(arm, holdout, &found.reported.estimate.theta, &others);
+        is_worse(&rms::<N>(&measured, &limited(&measured, &model.predict(data))))
     };
-    let (mut named, mut candidates) = (Vec::new(), Vec::new());
-    for n in &found.named {
-        let cause = cause(n, &rotary, commanded);
-        match why_not(n) {
-            Some(why) => candidates.push(Candidate { cause, why }),
-            None => named.push(cause),
-        }
-    }
+    let contradicted = worse && (hidden.is_empty() || !others.is_empty() && others_are_worse());
+    let (named, candidates) = causes(found, contradicted, &rotary, commanded);
     let reported = if contradicted { &found.refit_feasible } else { &found.reported };
     if contradicted {
         let (model, prediction) = (models[1].clone(), predicted[1].clone());
@@ -93,7 +91,7 @@ pub(crate) fn assemble<const N: usize, const P: usize>(
     let mut gap = gap(&compared, data, &rotary, options);
     let [_, refit, with_causes] = self::models(description, arm, training, found);
     let on_training = if contradicted { refit } else { with_causes };
-    gap.training = (!stands_out(&gap.after, &gap.floor, &gap.motion))
+    gap.training = (named.is_empty() && !stands_out(&gap.after, &gap.floor, &gap.motion))
         .then(|| training_gap(&training.data, &on_training))
         .flatten();
     let evidence = Evidence {
@@ -111,8 +109,8 @@ pub(crate) fn assemble<const N: usize, const P: usize>(
     let (free_run_series, free_run) = free_runs(&compared, data);
     gap.free_run = free_run;
     let mut notes = notes(found, training, holdout, &rotary);
-    notes.extend((contradicted && hidden).then(|| HIDDEN_STATES.to_owned()));
-    notes.extend(gap.training.as_ref().map(|errors| remark(errors, gap.unit)));
+    notes.extend((worse && !contradicted).then(|| HIDDEN_STATES.to_owned()));
+    notes.extend(gap.training.as_ref().map(|errors| remark(errors, &rotary)));
     Diagnosis {
         schema: "armgap.diagnosis/1",
         verdict,
@@ -154,6 +152,27 @@ pub(crate) fn assemble<const N: usize, const P: usize>(
     }
 }
 
+/// Terms of the final model as named causes, and as candidates with the reasons why they are not named; `contradicted` is whether predictions speak
+/// against them.
+fn causes(
+    found: &Found,
+    contradicted: bool,
+    rotary: &[bool],
+    commanded: Option<&PositionController>,
+) -> (Vec<Cause>, Vec<Candidate>) {
+    let why_not =
+        |n: &search::Named| n.unfit(rotary).or_else(|| contradicted.then(|| PREDICTS_WORSE.to_owned()));
+    let (mut named, mut candidates) = (Vec::new(), Vec::new());
+    for n in &found.named {
+        let cause = cause(n, rotary, commanded);
+        match why_not(n) {
+            Some(why) => candidates.push(Candidate { cause, why }),
+            None => named.push(cause),
+        }
+    }
+    (named, candidates)
+}
+
 /// The three models that a report compares: with the arm file's parameters, with parameters re-estimated, and with the named terms; behind the
 /// position controllers of the holdout, if there are any.
 fn models<const N: usize, const P: usize>(
@@ -162,18 +181,26 @@ fn models<const N: usize, const P: usize>(
     holdout: &Set<N, P>,
     found: &Found,
 ) -> [Model<N, P>; 3] {
-    let equation = &holdout.equation;
-    let of = |theta: &[f64], terms: &[Term]| {
-        let closed_loop = equation.commanded.as_ref().map(|commanded| ClosedLoop {
-            joints: with_settings(commanded.controller.with_differences(&theta[P..]), terms),
-            held_before: equation.held_before(theta, terms),
-        });
-        Model::new(arm, std::array::from_fn(|i| theta[i]), terms).behind(closed_loop)
-    };
+    let of = |theta: &[f64], terms: &[Term]| model_of(arm, holdout, theta, terms);
     let mut nominal = description.theta.clone();
-    nominal.resize(equation.rows.parameters, 0.0);
+    nominal.resize(holdout.equation.rows.parameters, 0.0);
     let (refit, reported) = (&found.refit_feasible.estimate.theta, &found.reported);
     [of(&nominal, &[]), of(refit, &[]), of(&reported.estimate.theta, &reported.terms)]
+}
+
+/// A model of the arm with parameters `theta`, SI, and `terms`, behind the position controllers of the logs of `set`, if there are any.
+fn model_of<const N: usize, const P: usize>(
+    arm: &Chain<f64, N>,
+    set: &Set<N, P>,
+    theta: &[f64],
+    terms: &[Term],
+) -> Model<N, P> {
+    let equation = &set.equation;
+    let closed_loop = equation.commanded.as_ref().map(|commanded| ClosedLoop {
+        joints: with_settings(commanded.controller.with_differences(&theta[P..]), terms),
+        held_before: equation.held_before(theta, terms),
+    });
+    Model::new(arm, std::array::from_fn(|i| theta[i]), terms).behind(closed_loop)
 }
 
 /// Share of each joint, 0 to 1, in the squared torque that the re-estimated arm leaves unexplained on the holdout above the position noise, largest

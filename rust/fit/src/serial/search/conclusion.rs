@@ -26,7 +26,6 @@ impl Search<'_> {
             (b.evidence.gain + b.evidence.holdout_gain)
                 .total_cmp(&(a.evidence.gain + a.evidence.holdout_gain))
         });
-        let unnamed = self.unnamed(regression, &model);
         let tested = self.tested(guesses, regression, &model);
         // Costs of the re-estimated and of the final model are comparable only under the same weights of the rows.
         let refit = if model.terms.is_empty() {
@@ -36,7 +35,9 @@ impl Search<'_> {
         };
         let probable =
             named.iter().filter(|n| n.unfit(&self.rotary).is_none()).map(|n| n.term.clone()).collect();
-        let reported = self.feasible(regression, self.fit(regression, probable, &model.estimate.theta));
+        let probable = self.fit(regression, probable, &model.estimate.theta);
+        let unnamed = self.unnamed(regression, &probable);
+        let reported = self.feasible(regression, probable);
         let refit_feasible = self.feasible(regression, refit.clone());
         Found {
             refit,
@@ -53,7 +54,7 @@ impl Search<'_> {
     /// The model with its links' parameters moved towards the arm file's until the inertia matrix is well conditioned ([`Search::is_feasible`]), and
     /// with rotor inertias and friction estimated again.
     fn feasible(&self, regression: &Regression, model: Fitted) -> Fitted {
-        let apart: Vec<usize> = model.terms.iter().filter_map(Term::own_motor).collect();
+        let apart: Vec<usize> = model.terms.iter().flat_map(Term::own_motors).collect();
         if (self.is_feasible)(&model.estimate.theta, &apart) {
             return model;
         }
@@ -75,7 +76,7 @@ impl Search<'_> {
     }
 
     /// Holdout cost (weighted squared residuals) that the noise of positions alone gives, by joint.
-    fn floor(&self, regression: &Regression) -> Vec<f64> {
+    pub(in crate::serial) fn floor(&self, regression: &Regression) -> Vec<f64> {
         let of = |(rows, w): (&JointRows, &f64)| w * rows.floor.iter().map(|f| f * f).sum::<f64>();
         self.holdout.rows().joints.iter().zip(&regression.weights).map(of).collect()
     }

@@ -214,8 +214,8 @@ impl Search<'_> {
     }
 
     /// Prior precision (inverse variance) of the first `columns` parameters of a term: for a changed link from the arm file's standard deviations,
-    /// for parameters that are not estimated so large that they stay zero, for the torques of a table as if each class had one further row with a
-    /// typical factor and no torque, else zero.
+    /// for parameters that are not estimated so large that they stay zero, for the steps of a table's torques as if each class had one further row
+    /// with a typical factor, else zero.
     pub(in crate::serial) fn ridge_of(
         &self,
         term: &Term,

@@ -92,7 +92,7 @@ pub struct Found {
     pub named: Vec<Named>,
     /// The model with only those terms that are probable enough to be named, for predictions.
     pub reported: Fitted,
-    /// Laws without a name that explain what the final model leaves, those that explain most first.
+    /// Laws without a name that explain what the model with the probable terms leaves, those that explain most first.
     pub unnamed: Vec<Dependence>,
     /// First-order tests, in addition to the terms of the final model, of all candidates that are not in this model.
     pub tested: Vec<Tested>,

@@ -116,8 +116,9 @@ impl Search<'_> {
                 return Some((Term { kind, p, degrees: free.len() as f64 }, gain));
             }
             TermKind::Transmission(_) => {
-                let (_, p, gain) = test_positive(regression, at, guess)?;
-                return (p[0] > 0.0).then(|| (term.with(p), gain));
+                let (free, p, gain) = test_positive(regression, at, guess)?;
+                let term = Term { kind: term.kind.clone(), degrees: free.len() as f64, p };
+                return (term.p[0] > 0.0).then_some((term, gain));
             }
             _ => {}
         }

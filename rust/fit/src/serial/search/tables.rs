@@ -7,6 +7,7 @@
 use crate::locate::dependence::{Dependence, DependenceLaw, MotionVariable};
 use crate::locate::table_form::{Factor, TableForm};
 use crate::locate::variable_classes::CLASSES;
+use crate::result::verdict::ABOVE_NOISE;
 use crate::serial::constants::{MOST_TABLES, PRICE, RIVAL_FINALISTS};
 use crate::serial::search::Search;
 use crate::serial::search::fitting::Fitted;
@@ -82,7 +83,7 @@ impl Search<'_> {
         Some((term, excess))
     }
 
-    /// The accepted model of least [`Fitted::total`] with one more table on one of `joints` (from 0); `None` where no table is accepted.
+    /// The model of least [`Fitted::total`] with one more table, accepted for what it explains, on one of `joints` (from 0); `None` where no table is accepted.
     fn with_table(
         &self,
         regression: &Regression,
@@ -100,7 +101,7 @@ impl Search<'_> {
                 terms.push(term);
                 self.fit(regression, terms, &model.estimate.theta)
             })
-            .filter(|with| self.evidence(regression, model, with, last).is_accepted())
+            .filter(|with| self.evidence(regression, model, with, last).explains())
             .min_by(|a, b| a.total().total_cmp(&b.total()))
     }
 
@@ -119,23 +120,38 @@ impl Search<'_> {
     /// that explain most first.
     pub(in crate::serial) fn unnamed(&self, regression: &Regression, model: &Fitted) -> Vec<Dependence> {
         let joints: Vec<usize> = (0..self.rotary.len()).collect();
+        let whole = self.held_above_noise(regression, model);
         let (mut model, mut found) = (model.clone(), Vec::new());
         for _ in 0..MOST_TABLES {
             let Some(with) = self.with_table(regression, &model, &joints, TableForm::listed) else { break };
-            found.extend(self.dependence(regression, &model, &with));
+            found.extend(self.dependence(regression, [&model, &with], &whole));
             model = with;
         }
         found.sort_by(|a, b| b.share.total_cmp(&a.share));
         found
     }
 
-    /// The last term of the model `with`, a table, as a law that results list.
-    fn dependence(&self, regression: &Regression, without: &Fitted, with: &Fitted) -> Option<Dependence> {
+    /// Squared holdout residuals of a model above those of the position noise, by joint.
+    fn held_above_noise(&self, regression: &Regression, model: &Fitted) -> Vec<f64> {
+        let left = |(costs, floor): (&Vec<f64>, f64)| (costs.iter().sum::<f64>() - floor).max(0.0);
+        model.costs[1].iter().zip(self.floor(regression)).map(left).collect()
+    }
+
+    /// The last term of the model `with`, a table, as a law that results list; `whole` is what all tables together could explain, by joint
+    /// ([`Self::held_above_noise`]).
+    fn dependence(
+        &self,
+        regression: &Regression,
+        [without, with]: [&Fitted; 2],
+        whole: &[f64],
+    ) -> Option<Dependence> {
         let term = with.terms.last()?;
         let TermKind::Table(table) = &term.kind else { return None };
         let columns = self.training.columns_of_table(table);
         let score = regression.score(&with.estimate, &columns, &self.ridge_of(term, CLASSES, regression))?;
         let covariance = regression.sandwich(&with.estimate, &columns, &score);
+        let held = |set: &Fitted| set.costs[1][table.joint].iter().sum::<f64>();
+        let fell = held(without) - held(with);
         let present: Vec<usize> = (0..CLASSES).filter(|c| table.mean[*c].is_some()).collect();
         // Classes are of equal count, so the mean torque over the classes is that along the logs.
         let count = present.len() as f64;
@@ -151,7 +167,7 @@ impl Search<'_> {
             variable: table.form.variable.name(),
             form: table.form,
             unit: table.form.variable.unit(self.rotary[table.form.variable.joint().unwrap_or(table.joint)]),
-            share: self.evidence(regression, without, with, with.terms.len() - 1).share.min(1.0),
+            share: (fell / whole[table.joint].max(f64::MIN_POSITIVE)).clamp(0.0, 1.0),
             // Terms are torques that the motion needs; a law without a name is a torque that acts on the joint.
             law: DependenceLaw {
                 x: present.iter().filter_map(|c| table.mean[*c]).collect(),
@@ -165,14 +181,14 @@ impl Search<'_> {
 
 /// Decrease of the training cost from which a table is accepted, where its joint's cost (weighted squared residuals) is `before` without it.
 ///
-/// With residuals judged at the variance that each model leaves, a decrease `g` raises the log-likelihood by `-before ln(1 - g / before) / 2`, which has
+/// With residuals judged at the variance that each model leaves, and weights made for residuals as large as without the table, a decrease `g` raises the log-likelihood by `-before ln(1 - g / before) / 2`, which has
 /// to pay for the table as for one term among some 400 candidates, and for its classes by Akaike's criterion.
 pub(in crate::serial) fn table_price(before: f64, term: &Term) -> f64 {
     before * (1.0 - (-(PRICE + 2.0 * term.degrees) / before.max(f64::MIN_POSITIVE)).exp())
 }
 
 /// Squared holdout residuals above those of the position noise (`floor`, by joint) that a model with a `rival` in a cause's place leaves, relative to
-/// those that the model with the cause leaves, on `joints` (from 0): 0 to 1.
+/// those that the model with the cause leaves, on `joints` (from 0): 0 to 1. Where the cause leaves no more than noise, 1.
 pub(in crate::serial) fn left_by_rival(
     model: &Fitted,
     rival: &Fitted,
@@ -182,6 +198,10 @@ pub(in crate::serial) fn left_by_rival(
     let left = |set: &Fitted| -> f64 {
         joints.iter().map(|j| (set.costs[1][*j].iter().sum::<f64>() - floor[*j]).max(0.0)).sum()
     };
+    let noise = joints.iter().map(|j| floor[*j]).sum::<f64>();
+    if left(model) < ABOVE_NOISE * ABOVE_NOISE * noise {
+        return 1.0;
+    }
     let ratio = left(rival) / left(model);
     if ratio.is_finite() { ratio.clamp(0.0, 1.0) } else { 1.0 }
 }
@@ -205,11 +225,12 @@ mod tests {
 
     #[test]
     fn what_a_rival_leaves_is_counted_above_the_noise_on_the_joints_of_the_cause() {
-        let (cause, rival) = (leaving([110.0, 50.0]), leaving([60.0, 5.0]));
+        let (cause, rival) = (leaving([210.0, 150.0]), leaving([110.0, 5.0]));
         assert!((left_by_rival(&cause, &rival, &[10.0; 2], &[0]) - 0.5).abs() < 1e-12);
         assert!((left_by_rival(&cause, &rival, &[10.0; 2], &[1]) - 0.0).abs() < 1e-12);
         assert_eq!(left_by_rival(&rival, &cause, &[10.0; 2], &[0]), 1.0);
-        assert_eq!(left_by_rival(&leaving([9.0; 2]), &leaving([8.0; 2]), &[10.0; 2], &[0, 1]), 1.0);
+        // A cause that leaves nine times the noise in squares, and a rival that leaves none: both within noise.
+        assert_eq!(left_by_rival(&leaving([90.0; 2]), &leaving([8.0; 2]), &[10.0; 2], &[0, 1]), 1.0);
     }
 
     #[test]

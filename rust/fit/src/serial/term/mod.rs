@@ -138,9 +138,13 @@ impl Term {
         }
     }
 
-    /// Joint (from 0) whose motor has a position of its own by the term, as behind an elastic shaft or backlash.
-    pub fn own_motor(&self) -> Option<usize> {
-        if let TermKind::Transmission(law) = self.kind { Some(law.joint) } else { None }
+    /// Joints (from 0) whose motors have positions of their own by the term, as behind elastic shafts or backlash.
+    pub fn own_motors(&self) -> Vec<usize> {
+        match &self.kind {
+            TermKind::Transmission(law) => vec![law.joint],
+            TermKind::Joints(of) => of.members.iter().flat_map(Self::own_motors).collect(),
+            _ => Vec::new(),
+        }
     }
 
     /// Factors (1 and 1, or 1 and -1) of two adjacent joints' positions in the sum or difference that the term acts along; `None` for terms of other

@@ -16,6 +16,8 @@ pub struct Table {
     pub joint: usize,
     /// Variable that the torque depends on, and what the table is multiplied by.
     pub form: TableForm,
+    /// Least value of the variable along the logs that the classes were made from.
+    least: f64,
     /// Values of the variable between the classes, ascending.
     edges: Vec<f64>,
     /// Mean of the variable in each class along the logs that the classes were made from; `None` for a class without samples.
@@ -31,6 +33,7 @@ impl Table {
         if along.is_empty() {
             return None;
         }
+        let least = along.iter().fold(f64::INFINITY, |least, x| least.min(x[1]));
         let edges = edges(along.iter().map(|x| x[1]).collect());
         let (mut sum, mut count) = ([0.0; CLASSES], [0.0; CLASSES]);
         for [_, x] in along {
@@ -41,11 +44,12 @@ impl Table {
         let mean = std::array::from_fn(|c| (count[c] > 0.0).then(|| sum[c] / count[c]));
         let factor_square = along.iter().map(|x| x[0] * x[0]).sum::<f64>() / along.len() as f64;
         let is_constant = mean.iter().flatten().count() < 2 || factor_square == 0.0;
-        (!is_constant).then_some(Self { joint, form, edges, mean, factor_square })
+        (!is_constant).then_some(Self { joint, form, least, edges, mean, factor_square })
     }
 
-    /// Class of a value of the variable.
+    /// Class of a value of the variable; values below the least belong to the class of the least.
     pub fn class(&self, x: f64) -> usize {
+        let x = x.max(self.least);
         self.edges.partition_point(|edge| *edge <= x)
     }
 
@@ -84,6 +88,15 @@ mod tests {
         assert_eq!(counts, [100; CLASSES]);
         assert_eq!((table.class(-5.0), table.class(1e9)), (0, CLASSES - 1));
         assert!((table.factor_square - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn values_below_the_least_are_in_its_class_where_many_samples_have_it() {
+        let along: Vec<[f64; 2]> = (0..200).map(|k| [1.0, f64::from((k - 100).max(0))]).collect();
+        let table = Table::new(0, OVER_TIME, &along).unwrap();
+        let class = table.class(0.0);
+        assert_eq!(table.class(-1e-9), class);
+        assert!(table.mean[class].is_some_and(|mean| mean < 1.0), "{:?}", table.mean);
     }
 
     #[test]

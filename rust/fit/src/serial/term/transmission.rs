@@ -181,7 +181,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
                     middles.par_iter().map(|m| self.link_torque(m, &links)[j]).collect()
                 };
                 if law.encoder_at_motor {
-                    bridge_rest(middles, j, &mut torques);
+                    bridge_rest(middles, j, |k| self.link_torque(&middles[k], &links)[j], &mut torques);
                 }
                 let of = |torque: f64| law.compliance.deflection(torque);
                 with_rates(middles, &low_passed(middles, &torques).into_iter().map(of).collect::<Vec<f64>>())
@@ -234,7 +234,8 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         let at = |m: &Middle<N>| -> Slope<N> {
             let slope = |place: fn(&mut Middle<N>, usize, f64)| {
                 let displaced = |by: f64| {
-                    let mut there = *m;
+                    // Velocities from local cubics are less noisy than differences of positions, and no mean over the interval is needed here.
+                    let mut there = Middle { mean_dq: m.dq, ..*m };
                     place(&mut there, j, by);
                     self.parts(&there, links)
                 };
@@ -332,9 +333,15 @@ impl<const P: usize> Computed<P> {
     }
 }
 
-/// Replaces the torques that the motor of joint `j` passes on while it is at rest by linear interpolation in time between those before and after: the
-/// friction of a motor at rest is unknown, and the shaft's torque is continuous. Where a log begins or ends at rest the nearest torque is held.
-fn bridge_rest<const N: usize>(middles: &[Middle<N>], j: usize, torques: &mut [f64]) {
+/// Replaces the torques that the motor of joint `j` passes on while it is at rest by those that the links need there (`links`, by index of the sample
+/// interval), plus the difference between the two, interpolated linearly in time between before and after the rest: the friction of a motor at rest is
+/// unknown, and the shaft's torque is continuous. Where a log begins or ends at rest the nearest difference is held.
+fn bridge_rest<const N: usize>(
+    middles: &[Middle<N>],
+    j: usize,
+    links: impl Fn(usize) -> f64,
+    torques: &mut [f64],
+) {
     let mut before: Option<usize> = None;
     let mut k = 0;
     while k < middles.len() {
@@ -345,15 +352,14 @@ fn bridge_rest<const N: usize>(middles: &[Middle<N>], j: usize, torques: &mut [f
         }
         let after = (k..middles.len()).find(|i| !middles[*i].rest[j]);
         let end = after.unwrap_or(middles.len());
+        let [from, to] = [before, after].map(|i| i.map(|i| (middles[i].t, torques[i] - links(i))));
         for i in k..end {
-            torques[i] = match (before, after) {
-                (Some(a), Some(b)) => {
-                    let part = (middles[i].t - middles[a].t) / (middles[b].t - middles[a].t);
-                    torques[a] + part * (torques[b] - torques[a])
-                }
-                (Some(one), None) | (None, Some(one)) => torques[one],
-                (None, None) => torques[i],
+            let difference = match (from, to) {
+                (Some((ta, a)), Some((tb, b))) => a + (middles[i].t - ta) / (tb - ta) * (b - a),
+                (Some((_, one)), None) | (None, Some((_, one))) => one,
+                (None, None) => 0.0,
             };
+            torques[i] = links(i) + difference;
         }
         k = end;
     }
@@ -414,15 +420,21 @@ mod tests {
     fn torques_of_a_motor_at_rest_lie_between_those_before_and_after() {
         let rest = [true, false, true, true, true, false, false, true];
         let mut torques = [9.0, 1.0, 9.0, -9.0, 9.0, 5.0, 4.0, -9.0];
-        bridge_rest(&middles(&rest), 0, &mut torques);
+        bridge_rest(&middles(&rest), 0, |_| 0.0, &mut torques);
         let expected = [1.0, 1.0, 2.0, 3.0, 4.0, 5.0, 4.0, 4.0];
         assert!(torques.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{torques:?}");
     }
 
     #[test]
-    fn a_motor_that_never_moves_keeps_its_torques() {
-        let mut torques = [1.0, -2.0];
-        bridge_rest(&middles(&[true; 2]), 0, &mut torques);
-        assert_eq!(torques, [1.0, -2.0]);
+    fn over_a_rest_torques_follow_those_of_the_links() {
+        let rest = [false, true, true, true, false];
+        let links = [1.0, 4.0, -2.0, 6.0, 3.0];
+        let mut torques = [2.0, 0.0, 0.0, 0.0, 8.0];
+        bridge_rest(&middles(&rest), 0, |k| links[k], &mut torques);
+        let expected = [2.0, 6.0, 1.0, 10.0, 8.0];
+        assert!(torques.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{torques:?}");
+        let mut never = [1.0, -2.0];
+        bridge_rest(&middles(&[true; 2]), 0, |k| links[k], &mut never);
+        assert_eq!(never, [1.0, 4.0]);
     }
 }

@@ -73,7 +73,7 @@ impl<const N: usize> Intervals<N> {
         let begin = track.t.first().copied().unwrap_or(0.0);
         let slow: [f64; N] = std::array::from_fn(|j| {
             let square: f64 = smoothed.iter().map(|s| s[j].local.dq.powi(2)).sum();
-            AT_REST_SPEED * (square / smoothed.len().max(1) as f64).sqrt()
+            (AT_REST_SPEED * (square / smoothed.len().max(1) as f64).sqrt()).max(1e-9)
         });
         let middle = |k: usize| -> Middle<N> {
             let h = track.t[k + 1] - track.t[k];
