@@ -26,13 +26,13 @@ use std::sync::{Arc, Mutex, PoisonError};
 const DISPLACEMENT: f64 = 1e-3;
 
 /// Time between the instants at which these derivatives are computed, s: between them a motion of 2 Hz bends them by less than a hundredth.
-const SLOPES_S: f64 = 0.02;
+const DERIVATIVES_S: f64 = 0.02;
 
 /// Derivatives of momentum and torque of the links by a joint's position, and by its velocity.
-type Slope<const N: usize> = [[SVector<f64, N>; 2]; 2];
+type LinkDerivative<const N: usize> = [[SVector<f64, N>; 2]; 2];
 
 /// Derivatives by log and sample interval.
-type Slopes<const N: usize> = Vec<Vec<Slope<N>>>;
+type LinkDerivatives<const N: usize> = Vec<Vec<LinkDerivative<N>>>;
 
 /// Elasticity or backlash of one joint's transmission.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -187,9 +187,9 @@ impl<const N: usize, const P: usize> Equation<N, P> {
                 with_rates(middles, &low_passed(middles, &torques).into_iter().map(of).collect::<Vec<f64>>())
             })
             .collect();
-        let slopes = law.encoder_at_motor.then(|| self.slopes(j, &links));
-        let by_deflection = |deflections: &[Vec<[f64; 2]>]| match &slopes {
-            Some(slopes) => self.weak_parts(&Self::behind_motors(deflections, slopes)),
+        let derivatives = law.encoder_at_motor.then(|| self.link_derivatives(j, &links));
+        let by_deflection = |deflections: &[Vec<[f64; 2]>]| match &derivatives {
+            Some(derivatives) => self.weak_parts(&Self::behind_motors(deflections, derivatives)),
             None => self.of_motor(j, deflections, theta),
         };
         let mut units = vec![by_deflection(&deflections)];
@@ -217,22 +217,25 @@ impl<const N: usize, const P: usize> Equation<N, P> {
     }
 
     /// Change of the links' torque by joint and row of the weak form, to first order, where the encoder of joint `j` measures the motor and the link
-    /// is behind by the deflection; `deflections` holds deflection and rate by log and sample interval, and `slopes` [`Self::slopes`].
-    fn behind_motors(deflections: &[Vec<[f64; 2]>], slopes: &Slopes<N>) -> Vec<Vec<[SVector<f64, N>; 2]>> {
-        let at = |([deflection, rate], [by_position, by_velocity]): (&[f64; 2], &Slope<N>)| {
+    /// is behind by the deflection; `deflections` holds deflection and rate by log and sample interval, and `derivatives` [`Self::link_derivatives`].
+    fn behind_motors(
+        deflections: &[Vec<[f64; 2]>],
+        derivatives: &LinkDerivatives<N>,
+    ) -> Vec<Vec<[SVector<f64, N>; 2]>> {
+        let at = |([deflection, rate], [by_position, by_velocity]): (&[f64; 2], &LinkDerivative<N>)| {
             std::array::from_fn(|part| -(by_position[part] * *deflection + by_velocity[part] * *rate))
         };
-        let along = |(deflections, slopes): (&Vec<[f64; 2]>, &Vec<Slope<N>>)| {
-            deflections.iter().zip(slopes).map(at).collect()
+        let along = |(deflections, derivatives): (&Vec<[f64; 2]>, &Vec<LinkDerivative<N>>)| {
+            deflections.iter().zip(derivatives).map(at).collect()
         };
-        deflections.iter().zip(slopes).map(along).collect()
+        deflections.iter().zip(derivatives).map(along).collect()
     }
 
     /// Derivatives of the links' momentum, and of their torque without the momentum's derivative, by position and velocity of joint `j`, by log and
-    /// sample interval; computed at instants [`SLOPES_S`] apart and interpolated between them.
-    fn slopes(&self, j: usize, links: &[f64; P]) -> Slopes<N> {
-        let at = |m: &Middle<N>| -> Slope<N> {
-            let slope = |place: fn(&mut Middle<N>, usize, f64)| {
+    /// sample interval; computed at instants [`DERIVATIVES_S`] apart and interpolated between them.
+    fn link_derivatives(&self, j: usize, links: &[f64; P]) -> LinkDerivatives<N> {
+        let at = |m: &Middle<N>| -> LinkDerivative<N> {
+            let derivative = |place: fn(&mut Middle<N>, usize, f64)| {
                 let displaced = |by: f64| {
                     // Velocities from local cubics are less noisy than differences of positions, and no mean over the interval is needed here.
                     let mut there = Middle { mean_dq: m.dq, ..*m };
@@ -243,8 +246,8 @@ impl<const N: usize, const P: usize> Equation<N, P> {
                 [pa - pb, ra - rb].map(|x| x / (2.0 * DISPLACEMENT))
             };
             [
-                slope(|m, j, by| m.q[j] += by),
-                slope(|m, j, by| {
+                derivative(|m, j, by| m.q[j] += by),
+                derivative(|m, j, by| {
                     m.dq[j] += by;
                     m.mean_dq[j] += by;
                 }),
@@ -254,12 +257,13 @@ impl<const N: usize, const P: usize> Equation<N, P> {
             let middles = &log.middles;
             let mut knots: Vec<usize> = Vec::new();
             for (k, m) in middles.iter().enumerate() {
-                let is_far = knots.last().is_none_or(|last| m.t - middles[*last].t > SLOPES_S - 0.5 * m.h);
+                let is_far =
+                    knots.last().is_none_or(|last| m.t - middles[*last].t > DERIVATIVES_S - 0.5 * m.h);
                 if is_far || k + 1 == middles.len() {
                     knots.push(k);
                 }
             }
-            let values: Vec<Slope<N>> = knots.par_iter().map(|k| at(&middles[*k])).collect();
+            let values: Vec<LinkDerivative<N>> = knots.par_iter().map(|k| at(&middles[*k])).collect();
             let between = |k: usize| {
                 let i = knots.partition_point(|knot| *knot <= k).min(knots.len() - 1).max(1);
                 let Some((a, b)) = values.get(i - 1).zip(values.get(i)) else { return values[0] };
