@@ -60,24 +60,26 @@ impl Evidence<'_> {
         stands_out(error, self.floor, self.motion)
     }
 
-    /// Whether re-estimated parameters lower the error of some joint noticeably.
-    fn is_improved(&self) -> bool {
-        let steps = self.before.iter().zip(self.refit).zip(self.floor);
-        steps.into_iter().any(|((before, refit), floor)| {
-            before - refit > IMPROVEMENT * before && *before > IMPROVABLE * floor
-        })
-    }
-
     /// Verdict that follows from the errors and from whether a cause is named.
     pub fn verdict(&self) -> Verdict {
         match () {
             () if self.named => Verdict::Effect,
             () if self.remains() => Verdict::Unexplained,
             // A gap that only re-estimated parameters bring down to the noise is more than noise with the arm file as it is.
-            () if self.is_improved() || self.stands_out(self.before) => Verdict::Parameters,
+            () if is_improved(self.before, self.refit, self.floor) || self.stands_out(self.before) => {
+                Verdict::Parameters
+            }
             () => Verdict::None,
         }
     }
+}
+
+/// Whether the error of some joint is noticeably lower `after` than `before`, in view of its noise `floor`; all in rad or m, by joint.
+pub(crate) fn is_improved(before: &[f64], after: &[f64], floor: &[f64]) -> bool {
+    let steps = before.iter().zip(after).zip(floor);
+    steps
+        .into_iter()
+        .any(|((before, after), floor)| before - after > IMPROVEMENT * before && *before > IMPROVABLE * floor)
 }
 
 /// Whether the `error` of some joint is several noise floors and of consequence in relation to the joint's motion; all in rad or m, by joint.

@@ -16,7 +16,7 @@ use crate::result::report::{
     Noise, OptionSummary, Parameters, TrainingErrors, Value,
 };
 use crate::result::training_gap::remark;
-use crate::result::verdict::{Evidence, stands_out};
+use crate::result::verdict::{Evidence, is_improved, stands_out};
 use crate::serial::controller::PositionController;
 use crate::serial::controller::closed_loop::ClosedLoop;
 use crate::serial::predict::{Model, floor};
@@ -71,7 +71,10 @@ pub(crate) fn assemble<const N: usize, const P: usize>(
     let measured = data.measured();
     let floor: Vec<f64> = floor(data, &noise).iter().map(|v| v.sqrt()).collect();
     let missed = |i: usize| rms::<N>(&measured, &limited(&measured, &predicted[i]));
-    let is_worse = |errors: &[f64]| closed(&missed(1), errors, &floor) < 0.0;
+    let is_worse = |errors: &[f64]| {
+        let refit = missed(1);
+        closed(&refit, errors, &floor) < 0.0 && is_improved(errors, &refit, &floor)
+    };
     let worse = is_worse(&missed(2));
     // Deflections of elastic joints and backlash are not measured, so that predictions say little about these causes; they still judge the others.
     let (hidden, others): (Vec<Term>, Vec<Term>) =

@@ -63,6 +63,8 @@ impl Search<'_> {
                 break;
             }
             let theta = estimate.theta.clone();
+            // Torques of terms may depend on the parameters: costs are compared at the same ones.
+            estimate = self.estimated(regression, &terms, &theta);
             let columns = self.derivatives(&terms, &theta);
             let Some(score) = regression.score(&estimate, &columns, &self.ridge(&terms, regression)) else {
                 break;
