@@ -251,9 +251,6 @@ fn controller_settings(controller: &PositionController, inertia: &[f64], period:
 /// Largest number of half cycles over the travel of a joint among the initial guesses of a torque ripple.
 const HALF_CYCLES: usize = 80;
 
-/// Initial guesses of the transmitted torque around zero within which a link crosses its backlash, relative to the joint's RMS torque.
-const CROSSINGS: [f64; 2] = [0.03, 0.15];
-
 /// Every candidate term of an arm without controllers, at each of its initial guesses, grouped by effect and joint. Left out are effects of the
 /// library that simulate a motor as a body separate from its link (the weak form has terms of its own for transmissions), external disturbances, and
 /// effects on the whole arm, which are stated for arms in a plane.
@@ -296,14 +293,12 @@ fn candidates<const N: usize, const P: usize>(
         }
     }
     for joint in 0..N {
-        let torque = scales.size(Quantity::Torque, joint);
-        let crossings = CROSSINGS.map(|share| Compliance::Backlash(share * torque));
-        for laws in [&[Compliance::Elastic][..], &crossings] {
-            let places = laws.iter().flat_map(|law| [true, false].map(|at_motor| (*law, at_motor)));
-            let term = |(compliance, encoder_at_motor)| {
-                Term::neutral(TermKind::Transmission(TransmissionLaw { joint, encoder_at_motor, compliance }))
-            };
-            groups.push(places.map(term).collect());
+        for compliance in [Compliance::Elastic, Compliance::Backlash] {
+            let laws =
+                [true, false].map(|encoder_at_motor| TransmissionLaw { joint, encoder_at_motor, compliance });
+            groups.push(
+                laws.iter().flat_map(|law| law.guesses(scales.size(Quantity::Position, joint))).collect(),
+            );
         }
     }
     groups.extend(row_term::candidates(&arm.joints().iter().map(|joint| joint.kind).collect::<Vec<_>>()));

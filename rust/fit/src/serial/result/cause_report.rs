@@ -182,7 +182,9 @@ fn status(found: &Found, unexplained: &[Option<f64>], tested: &Tested, rotary: &
         return entry(Status::Undecided, None, Some(why));
     }
     let parameters = term.parameters(rotary_of(term, rotary));
-    let bound = (term.amplitudes() > 0 && !matches!(term.kind, TermKind::NominalLink(_)))
+    // The torque of a gap is nearly in proportion to it.
+    let is_scaled = term.amplitudes() > 0 || matches!(term.kind, TermKind::Transmission(_));
+    let bound = (is_scaled && !matches!(term.kind, TermKind::NominalLink(_)))
         .then(|| {
             let p = parameters.first()?;
             let value = (largest * (term.p[0] - p.neutral)).abs();

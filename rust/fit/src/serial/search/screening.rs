@@ -115,7 +115,7 @@ impl Search<'_> {
                 let kind = TermKind::Row(RowTerm { law, ..row });
                 return Some((Term { kind, p, degrees: free.len() as f64 }, gain));
             }
-            TermKind::Transmission(_) => {
+            TermKind::Transmission(law) if law.amplitudes() > 0 => {
                 let (free, p, gain) = test_positive(regression, at, guess)?;
                 let term = Term { kind: term.kind.clone(), degrees: free.len() as f64, p };
                 return (term.p[0] > 0.0).then_some((term, gain));
@@ -132,6 +132,7 @@ impl Search<'_> {
         }
         let trial = match term.kind {
             TermKind::Law(effect) => effect.law.spec().trial,
+            TermKind::Transmission(_) => Trial::Whole,
             _ => Trial::Amplitudes(1),
         };
         let size = score.size[0];
@@ -142,7 +143,7 @@ impl Search<'_> {
                 let share = size.clamp(0.0, FARTHEST);
                 (vec![term.p[0], share * term.p[1], share * term.p[2]], share)
             }
-            // The torque of an effect with a threshold is not in proportion to its values, which stay at the initial guess.
+            // The torque of an effect with a threshold, or of a gap, is not in proportion to its values, which stay at the initial guess.
             Trial::Whole => (term.p.clone(), 1.0),
             Trial::Ray => {
                 let share = size.clamp(0.0, FARTHEST);

@@ -1,6 +1,7 @@
 //! Terms that a serial arm's model may lack: the library's effects on single joints, and changes of the arm's links, base, transmissions and
 //! controllers.
 
+pub(in crate::serial) mod backlash;
 pub(in crate::serial) mod controller_term;
 pub(in crate::serial) mod row_term;
 pub(in crate::serial) mod several_joints;
@@ -239,7 +240,7 @@ impl Term {
             TermKind::NominalLink(_) => LINK_NAMES.len(),
             TermKind::Joints(ref of) => of.members[0].amplitudes(),
             TermKind::Row(RowTerm { law: RowLaw::Transmission(_), .. }) => 3,
-            TermKind::Transmission(law) => law.parameters(true).len(),
+            TermKind::Transmission(law) => law.amplitudes(),
             TermKind::Row(_) => 1,
             TermKind::Table(_) => CLASSES,
         }

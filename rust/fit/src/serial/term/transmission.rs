@@ -1,14 +1,16 @@
 //! Joint elasticity and backlash in the weak form: how a deflection between motor and link changes the equation of motion.
 //!
 //! The deflection between motor and link follows from the torque `T` that the transmission passes on: for an elastic shaft (Spong 1987), whose spring
-//! and damper act side by side, `T / stiffness` delayed by the ratio of damping and stiffness, to first order in this time; for backlash, half the gap towards the side that `T` pushes to (Nordin and Gutman 2002). Where the encoder
-//! measures the motor, `T` is the motor's torque less those of rotor inertia and friction, and the link's position is the motor's less the
-//! deflection; where the encoder measures the link, `T` is the torque of the links, and the motor's position, at which rotor inertia and friction
-//! act, is the link's plus the deflection. `T` is unknown while the motor is at rest, since its dry friction is: it is interpolated there, as the
-//! deflection is continuous.
+//! and damper act side by side, `T / stiffness` delayed by the ratio of damping and stiffness, to first order in this time; for backlash, half the gap
+//! towards the side that `T` pushes to, and a free motion from one flank to the other where `T` changes sign ([`super::backlash`]). Where the encoder
+//! measures the motor, the link's position is the motor's less the deflection, and `T` in an elastic shaft is the motor's torque less those of rotor
+//! inertia and friction; where the encoder measures the link, the motor's position, at which rotor inertia and friction act, is the link's plus the
+//! deflection, and `T` in an elastic shaft is the torque of the links. The motor's torque is unknown while it is at rest, since its dry friction is:
+//! it is interpolated there, as the deflection is continuous.
 
 use crate::model::hypothesis::EffectInstance;
-use crate::serial::term::TermParameter;
+use crate::numeric::cache::Cache;
+use crate::serial::term::{Term, TermKind, TermParameter, backlash};
 use crate::serial::weak_form::equation::Equation;
 use crate::serial::weak_form::intervals::{Intervals, Middle};
 use crate::serial::weak_form::rows::{Signal, sum};
@@ -18,8 +20,6 @@ use armgap_core::kinematics::JointState;
 use armgap_core::transmission::Sides;
 use nalgebra::SVector;
 use rayon::prelude::*;
-use std::collections::VecDeque;
-use std::sync::{Arc, Mutex, PoisonError};
 
 /// Displacement of a joint, rad (m), and of its velocity, rad/s (m/s), in numerical derivatives of torques by the deflection of a transmission; torques
 /// are smooth functions of both.
@@ -51,19 +51,8 @@ pub enum Compliance {
     /// Elastic shaft: the deflection is `compliance T - lag dT/dt`, with the compliance the inverse stiffness and the lag the damping over the squared
     /// stiffness.
     Elastic,
-    /// Backlash: the deflection is half the gap, to the side that the torque pushes to; the value is the torque around zero within which the link
-    /// crosses the gap, N m (N).
-    Backlash(f64),
-}
-
-impl Compliance {
-    /// Deflection between motor and link under a constant transmitted torque, N m (N), per unit of the compliance or of the gap.
-    fn deflection(self, torque: f64) -> f64 {
-        match self {
-            Self::Elastic => torque,
-            Self::Backlash(crossing) => 0.5 * (torque / crossing).tanh(),
-        }
-    }
+    /// Backlash: the deflection is half the gap, to the side that the torque pushes to, and crosses the gap freely.
+    Backlash,
 }
 
 /// Least and largest damping ratio of an elastic joint's oscillation in predictions: beyond them the estimate is taken as uncertain.
@@ -81,7 +70,7 @@ impl TransmissionLaw {
     fn effect(&self) -> &'static dyn Effect<f64> {
         let name = match self.compliance {
             Compliance::Elastic => "joint_elasticity",
-            Compliance::Backlash(_) => "backlash",
+            Compliance::Backlash => "backlash",
         };
         find(name).expect("the library has both")
     }
@@ -96,6 +85,27 @@ impl TransmissionLaw {
         self.effect().spec().title
     }
 
+    /// Candidate terms of the law at its initial guesses; `scale` is the size of the joint's positions, rad or m, by which gaps are guessed.
+    pub fn guesses(self, scale: f64) -> Vec<Term> {
+        let neutral = Term::neutral(TermKind::Transmission(self));
+        match self.compliance {
+            Compliance::Elastic => vec![neutral],
+            Compliance::Backlash => {
+                let mut gaps: Vec<f64> = self.effect().spec().initial_guesses.iter().map(|p| p[0]).collect();
+                gaps.dedup();
+                gaps.into_iter().map(|gap| neutral.with(vec![gap * scale])).collect()
+            }
+        }
+    }
+
+    /// Number of leading parameters in which the torque is linear: the torque of an elastic shaft is, the time of a crossing depends on the gap.
+    pub fn amplitudes(&self) -> usize {
+        match self.compliance {
+            Compliance::Elastic => 2,
+            Compliance::Backlash => 0,
+        }
+    }
+
     /// Names, units and bounds of the estimated parameters, compliance and lag or gap; `rotary` is whether the joint is rotary.
     pub fn parameters(&self, rotary: bool) -> Vec<TermParameter> {
         let of = |name, units: [&'static str; 2], inverse: Option<(&'static str, [&'static str; 2])>| {
@@ -108,7 +118,7 @@ impl TransmissionLaw {
                 of("compliance", ["rad/(N m)", "m/N"], Some(("stiffness", ["N m/rad", "N/m"]))),
                 of("lag", ["rad s/(N m)", "m s/N"], None),
             ],
-            Compliance::Backlash(_) => vec![of("gap", ["rad", "m"], None)],
+            Compliance::Backlash => vec![of("gap", ["rad", "m"], None)],
         }
     }
 
@@ -135,7 +145,7 @@ impl TransmissionLaw {
                 let damping = 2.0 * ratio.clamp(DAMPING[0], DAMPING[1]) * (stiffness * rotor_inertia).sqrt();
                 ([stiffness, damping, rotor_inertia], rotor)
             }
-            Compliance::Backlash(_) => ([size, (rotor_inertia / inertia).clamp(0.005, 0.35), 0.0], 0.0),
+            Compliance::Backlash => ([size, (rotor_inertia / inertia).clamp(0.005, 0.35), 0.0], 0.0),
         };
         let sides = if self.encoder_at_motor {
             Sides::MOTOR
@@ -148,7 +158,7 @@ impl TransmissionLaw {
 
 impl<const N: usize, const P: usize> Equation<N, P> {
     /// Torque by joint and row of the weak form, N m or N, due to the deflection of a transmission with the parameters `p` of
-    /// [`TransmissionLaw::parameters`]: to first order, so in proportion to each of them.
+    /// [`TransmissionLaw::parameters`]: to first order in the deflection.
     pub(in crate::serial) fn of_transmission(
         &self,
         law: &TransmissionLaw,
@@ -158,49 +168,84 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         if p.iter().all(|p| *p == 0.0) {
             return vec![None; N];
         }
-        let units = self.computed.of(law, theta, || self.of_units(law, theta));
-        let scaled = |(unit, p): (&Signal, &f64)| -> Signal {
-            unit.iter().map(|s| s.as_ref().map(|s| s.iter().map(|x| p * x).collect())).collect()
-        };
-        sum(&self.rows, &units.iter().zip(p).map(scaled).collect::<Vec<Signal>>())
+        let at = (*law, *theta);
+        match law.compliance {
+            Compliance::Elastic => {
+                let units = self.computed.units.of(&at, || self.of_elastic_units(law, theta));
+                let scaled = |(unit, p): (&Signal, &f64)| -> Signal {
+                    unit.iter().map(|s| s.as_ref().map(|s| s.iter().map(|x| p * x).collect())).collect()
+                };
+                sum(&self.rows, &units.iter().zip(p).map(scaled).collect::<Vec<Signal>>())
+            }
+            Compliance::Backlash => {
+                let inside = self.computed.inside.of(&at, || self.inside_gap(law, theta));
+                let paths: Vec<_> = inside.iter().map(|log| backlash::deflections(log, p[0])).collect();
+                self.of_deflections(law, &paths, theta)
+            }
+        }
     }
 
-    /// Torques by joint and row of the weak form due to the deflection of a transmission, to first order, per unit of each of its parameters.
-    fn of_units(&self, law: &TransmissionLaw, theta: &[f64; P]) -> Vec<Signal> {
+    /// Torques by joint and row of the weak form due to the deflection of an elastic shaft, per unit of its compliance and of its lag.
+    fn of_elastic_units(&self, law: &TransmissionLaw, theta: &[f64; P]) -> Vec<Signal> {
         let j = law.joint;
+        let links = Self::links(theta);
+        let along = |log: &Intervals<N>| {
+            let middles = &log.middles;
+            let mut torques: Vec<f64> = if law.encoder_at_motor {
+                middles.par_iter().map(|m| self.motor_torque(m, j, theta)).collect()
+            } else {
+                middles.par_iter().map(|m| self.link_torque(m, &links)[j]).collect()
+            };
+            if law.encoder_at_motor {
+                bridge_rest(middles, j, |k| self.link_torque(&middles[k], &links)[j], &mut torques);
+            }
+            with_rates(middles, &low_passed(middles, &torques))
+        };
+        let deflections: Vec<Vec<[f64; 2]>> = self.logs().iter().map(along).collect();
+        let lagging = |(log, deflections): (&Intervals<N>, &Vec<[f64; 2]>)| {
+            with_rates(&log.middles, &deflections.iter().map(|d| -d[1]).collect::<Vec<f64>>())
+        };
+        let lagging: Vec<_> = self.logs().iter().zip(&deflections).map(lagging).collect();
+        [&deflections, &lagging].map(|deflections| self.of_deflections(law, deflections, theta)).to_vec()
+    }
+
+    /// Length of each sample interval, s, and acceleration of the deflection inside the gap of a backlash, rad/s^2 (m/s^2), log by log: the torque that
+    /// the body whose motion is not measured would need to stay on its flank, by the inertia of this body.
+    fn inside_gap(&self, law: &TransmissionLaw, theta: &[f64; P]) -> InsideGap {
+        let j = law.joint;
+        let links = Self::links(theta);
+        let at = |m: &Middle<N>| {
+            let inertia = self.arm.inertia(&links, &SVector::from(m.q))[(j, j)];
+            if law.encoder_at_motor {
+                return [m.h, self.link_torque(m, &links)[j] / inertia];
+            }
+            let rotor = if theta[10 * N + j] > 0.0 { theta[10 * N + j] } else { ROTOR_SHARE * inertia };
+            [m.h, self.motor_torque(m, j, theta) / rotor]
+        };
+        self.logs().iter().map(|log| log.middles.par_iter().map(at).collect()).collect()
+    }
+
+    /// Torque by joint and row of the weak form due to deflections of a transmission, given with their rates by log and sample interval.
+    fn of_deflections(
+        &self,
+        law: &TransmissionLaw,
+        deflections: &[Vec<[f64; 2]>],
+        theta: &[f64; P],
+    ) -> Signal {
+        let j = law.joint;
+        if !law.encoder_at_motor {
+            return self.of_motor(j, deflections, theta);
+        }
+        let at = (j, *theta);
+        let derivatives = self.computed.derivatives.of(&at, || self.link_derivatives(j, &Self::links(theta)));
+        self.weak_parts(&Self::behind_motors(deflections, &derivatives))
+    }
+
+    /// The arm's parameters without rotor inertias and friction.
+    fn links(theta: &[f64; P]) -> [f64; P] {
         let mut links = *theta;
         links[10 * N..].fill(0.0);
-        let deflections: Vec<Vec<[f64; 2]>> = self
-            .logs()
-            .iter()
-            .map(|log| {
-                let middles = &log.middles;
-                let mut torques: Vec<f64> = if law.encoder_at_motor {
-                    middles.par_iter().map(|m| self.motor_torque(m, j, theta)).collect()
-                } else {
-                    middles.par_iter().map(|m| self.link_torque(m, &links)[j]).collect()
-                };
-                if law.encoder_at_motor {
-                    bridge_rest(middles, j, |k| self.link_torque(&middles[k], &links)[j], &mut torques);
-                }
-                let of = |torque: f64| law.compliance.deflection(torque);
-                with_rates(middles, &low_passed(middles, &torques).into_iter().map(of).collect::<Vec<f64>>())
-            })
-            .collect();
-        let derivatives = law.encoder_at_motor.then(|| self.link_derivatives(j, &links));
-        let by_deflection = |deflections: &[Vec<[f64; 2]>]| match &derivatives {
-            Some(derivatives) => self.weak_parts(&Self::behind_motors(deflections, derivatives)),
-            None => self.of_motor(j, deflections, theta),
-        };
-        let mut units = vec![by_deflection(&deflections)];
-        if law.compliance == Compliance::Elastic {
-            let lagging = |(log, deflections): (&Intervals<N>, &Vec<[f64; 2]>)| {
-                with_rates(&log.middles, &deflections.iter().map(|d| -d[1]).collect::<Vec<f64>>())
-            };
-            let lagging: Vec<_> = self.logs().iter().zip(&deflections).map(lagging).collect();
-            units.push(by_deflection(&lagging));
-        }
-        units
+        links
     }
 
     /// Torque that the motor of joint `j` passes on along the measured motion, N m or N: the motor's torque less those of rotor inertia and friction.
@@ -300,41 +345,21 @@ impl<const N: usize, const P: usize> Equation<N, P> {
     }
 }
 
-/// Cache of the last torques of transmissions per unit of their parameters; a fit needs each torque at several sizes.
-#[derive(Debug)]
-pub struct Computed<const P: usize>(Mutex<VecDeque<Entry<P>>>);
+/// A transmission, and the arm's parameters along whose motion it was evaluated.
+type At<const P: usize> = (TransmissionLaw, [f64; P]);
 
-/// Cache entry: a transmission, the arm's parameters, and the transmission's torques per unit of each of its parameters.
-type Entry<const P: usize> = (TransmissionLaw, [f64; P], Arc<Vec<Signal>>);
+/// Length of each sample interval, s, and acceleration of a deflection inside its gap, rad/s^2 (m/s^2), log by log.
+type InsideGap = Vec<Vec<[f64; 2]>>;
 
-/// Number of torque signals of transmissions that the cache holds.
-const KEPT: usize = 16;
-
-impl<const P: usize> Default for Computed<P> {
-    fn default() -> Self {
-        Self(Mutex::new(VecDeque::with_capacity(KEPT)))
-    }
-}
-
-impl<const P: usize> Computed<P> {
-    fn of(
-        &self,
-        law: &TransmissionLaw,
-        theta: &[f64; P],
-        compute: impl FnOnce() -> Vec<Signal>,
-    ) -> Arc<Vec<Signal>> {
-        let kept = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((.., signals)) = kept().iter().find(|(l, t, _)| l == law && t == theta) {
-            return Arc::clone(signals);
-        }
-        let signals = Arc::new(compute());
-        let mut all = kept();
-        if all.len() == KEPT {
-            all.pop_front();
-        }
-        all.push_back((*law, *theta, Arc::clone(&signals)));
-        signals
-    }
+/// What the last evaluations of transmissions computed along the logs; a fit needs each of these at several values.
+#[derive(Debug, Default)]
+pub struct Computed<const N: usize, const P: usize> {
+    /// Torques per unit of compliance and lag of an elastic shaft, by joint and row.
+    units: Cache<At<P>, Vec<Signal>>,
+    /// Motion inside a gap.
+    inside: Cache<At<P>, InsideGap>,
+    /// Derivatives of the links' torques by the position and velocity of a joint.
+    derivatives: Cache<(usize, [f64; P]), LinkDerivatives<N>>,
 }
 
 /// Replaces the torques that the motor of joint `j` passes on while it is at rest by those that the links need there (`links`, by index of the sample

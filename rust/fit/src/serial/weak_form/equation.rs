@@ -39,8 +39,8 @@ pub struct Equation<const N: usize, const P: usize> {
     pub(in crate::serial) functions: Vec<TestFunction>,
     /// Indices, by joint, of the test functions during which the joint moves; each gives one row.
     pub(in crate::serial) kept: Vec<Vec<usize>>,
-    /// Cached torque signals of elastic joints and backlash.
-    pub(in crate::serial) computed: Computed<P>,
+    /// What elastic joints and backlash computed along the logs at the last parameters.
+    pub(in crate::serial) computed: Computed<N, P>,
     /// Position controllers that command the torques in logs with references; `None` for logs with torques.
     pub(in crate::serial) commanded: Option<Commanded<N>>,
 }
