@@ -297,7 +297,11 @@ fn candidates<const N: usize, const P: usize>(
             let laws =
                 [true, false].map(|encoder_at_motor| TransmissionLaw { joint, encoder_at_motor, compliance });
             groups.push(
-                laws.iter().flat_map(|law| law.guesses(scales.size(Quantity::Position, joint))).collect(),
+                laws.iter()
+                    .flat_map(|law| {
+                        law.guesses(scales.size(Quantity::Position, joint), scales.inertia[joint])
+                    })
+                    .collect(),
             );
         }
     }

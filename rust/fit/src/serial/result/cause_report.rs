@@ -74,7 +74,7 @@ fn named_values(term: &Term, sigma: &[f64], rotary: &[bool]) -> Named<Value> {
         && let Some([damping, sigma]) = TransmissionLaw::damping(&term.p, &finite)
     {
         let unit = if rotary_of(term, rotary) { "N m s/rad" } else { "N s/m" };
-        values.remove("lag");
+        values.remove("retardation_time");
         values.insert("damping".to_owned(), Value { value: damping, sigma, unit });
     }
     values
@@ -182,7 +182,7 @@ fn status(found: &Found, unexplained: &[Option<f64>], tested: &Tested, rotary: &
         return entry(Status::Undecided, None, Some(why));
     }
     let parameters = term.parameters(rotary_of(term, rotary));
-    // The torque of a gap is nearly in proportion to it.
+    // The torque of a deflection is nearly in proportion to it.
     let is_scaled = term.amplitudes() > 0 || matches!(term.kind, TermKind::Transmission(_));
     let bound = (is_scaled && !matches!(term.kind, TermKind::NominalLink(_)))
         .then(|| {

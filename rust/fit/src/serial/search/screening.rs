@@ -115,11 +115,6 @@ impl Search<'_> {
                 let kind = TermKind::Row(RowTerm { law, ..row });
                 return Some((Term { kind, p, degrees: free.len() as f64 }, gain));
             }
-            TermKind::Transmission(law) if law.amplitudes() > 0 => {
-                let (free, p, gain) = test_positive(regression, at, guess)?;
-                let term = Term { kind: term.kind.clone(), degrees: free.len() as f64, p };
-                return (term.p[0] > 0.0).then_some((term, gain));
-            }
             _ => {}
         }
         let count = term.amplitudes();
@@ -143,7 +138,7 @@ impl Search<'_> {
                 let share = size.clamp(0.0, FARTHEST);
                 (vec![term.p[0], share * term.p[1], share * term.p[2]], share)
             }
-            // The torque of an effect with a threshold, or of a gap, is not in proportion to its values, which stay at the initial guess.
+            // The torque of an effect with a threshold, or of a deflection, is not in proportion to its values, which stay at the initial guess.
             Trial::Whole => (term.p.clone(), 1.0),
             Trial::Ray => {
                 let share = size.clamp(0.0, FARTHEST);

@@ -1,8 +1,8 @@
 //! Terms that a serial arm's model may lack: the library's effects on single joints, and changes of the arm's links, base, transmissions and
 //! controllers.
 
-pub(in crate::serial) mod backlash;
 pub(in crate::serial) mod controller_term;
+pub(in crate::serial) mod deflection;
 pub(in crate::serial) mod row_term;
 pub(in crate::serial) mod several_joints;
 pub(in crate::serial) mod table;
@@ -40,7 +40,7 @@ pub enum TermKind {
     BaseTilt,
     /// Difference of a link's mass, first moments and inertia from the nominal values; the number is the link's 0-based index.
     NominalLink(usize),
-    /// Joint elasticity or backlash of a transmission; parameters are the compliance, rad/(N m) (m/N), and the lag, rad s/(N m) (m s/N), or the gap,
+    /// Joint elasticity or backlash of a transmission; parameters are the compliance, rad/(N m) (m/N), and the retardation time, s, or the gap,
     /// rad (m).
     Transmission(TransmissionLaw),
     /// A setting of a joint's position controller that differs from the arm file.
@@ -235,12 +235,11 @@ impl Term {
                     _ => 0,
                 }
             }
-            TermKind::Payload | TermKind::Controller(_) => 0,
+            TermKind::Payload | TermKind::Transmission(_) | TermKind::Controller(_) => 0,
             TermKind::BaseTilt => TURN.len(),
             TermKind::NominalLink(_) => LINK_NAMES.len(),
             TermKind::Joints(ref of) => of.members[0].amplitudes(),
             TermKind::Row(RowTerm { law: RowLaw::Transmission(_), .. }) => 3,
-            TermKind::Transmission(law) => law.amplitudes(),
             TermKind::Row(_) => 1,
             TermKind::Table(_) => CLASSES,
         }
