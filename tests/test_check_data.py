@@ -270,6 +270,15 @@ def test_rows_left_out_keep_the_impulse(clean: Log) -> None:
     assert longer @ fewer.tau == pytest.approx(held @ clean.tau)
 
 
+def test_rows_are_left_out_of_a_log_without_torques(clean: Log) -> None:
+    """Logs of a position controller hold references in place of torques, and no moments of torques either."""
+    commanded = replace(clean, tau=np.empty((len(clean), 0)), q_ref=clean.q)
+    fewer = with_rows(commanded, np.flatnonzero(np.arange(len(clean)) % 7 != 3))
+    assert fewer.tau.shape == (len(fewer), 0)
+    assert fewer.moment is None
+    assert fewer.q_ref is not None
+
+
 def test_copies_are_found_by_content(clean: Log, arm: Arm) -> None:
     t = clean.t
     other = simulate(arm, t, 0.8 * seed_torque(t), sensor=True, name="other")

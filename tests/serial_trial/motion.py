@@ -280,10 +280,9 @@ class _Servo:
 
     def command(self, effect: Effect, reference: Array, data: Any) -> Array:
         """Return the torques of this integration step; `stated` gets the torques of the stated gains for an undelayed reference."""
-        q, moved = data.qpos.copy(), 1e-6
-        shown = effect.reading(q)
-        speed = (effect.reading(q + moved * data.qvel) - shown) / moved
-        shown = np.round(shown / self.step) * self.step
+        q = data.qpos.copy()
+        speed = effect.reading_rate(q, data.qvel)
+        shown = np.round(effect.reading(q) / self.step) * self.step
         self.stated = np.clip(self.kp * (reference - shown) - self.kd * speed, -self.effort, self.effort)
         kp, kd = effect.gains(self.kp, self.kd)
         out = kp * (effect.arriving(reference) - shown) - kd * speed

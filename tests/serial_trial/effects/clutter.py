@@ -57,6 +57,11 @@ class Clutter(Effect):
             q = effect.reading(q)
         return q
 
+    def reading_rate(self, q: Array, dq: Array) -> Array:
+        for effect in self.members:
+            q, dq = effect.reading(q), effect.reading_rate(q, dq)
+        return dq
+
     def gains(self, kp: Array, kd: Array) -> tuple[Array, Array]:
         for effect in self.members:
             kp, kd = effect.gains(kp, kd)

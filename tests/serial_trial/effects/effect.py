@@ -103,6 +103,11 @@ class Effect:
         """Return the positions that encoders show before rounding."""
         return q
 
+    def reading_rate(self, q: Array, dq: Array) -> Array:
+        """Return the rates of change of the positions that encoders show."""
+        moved = 1e-6
+        return (self.reading(q + moved * dq) - self.reading(q)) / moved
+
     def gains(self, kp: Array, kd: Array) -> tuple[Array, Array]:
         """Return the gains that the servos really have, for the gains `kp` and `kd` that the arm file states."""
         return kp, kd

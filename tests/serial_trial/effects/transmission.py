@@ -60,6 +60,11 @@ class Transmission(Effect):
         shown[self.joint] = q[self.joint] + self.deflection(self.preload) if self.position is None else self.position
         return shown
 
+    def reading_rate(self, q, dq):
+        shown = dq.copy()
+        shown[self.joint] = dq[self.joint] if self.position is None else self.speed
+        return shown
+
 
 @dataclass
 class JointElasticity(Transmission):

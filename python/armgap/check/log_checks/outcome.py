@@ -99,7 +99,8 @@ def with_rows(log: Log, kept: NDArray[np.intp], valid: NDArray[np.bool_] | None 
     if log.q_ref is not None:
         q_ref = np.add.reduceat((log.q_ref * held)[first:], starts) / np.add.reduceat(held[first:], starts)
         q_ref[alone] = log.q_ref[kept[alone]]
-    return replace(log, **arrays, tau=tau, q_ref=q_ref, moment=_moment(log, kept, tau, valid))
+    moment = _moment(log, kept, tau, valid) if log.has_torques else None
+    return replace(log, **arrays, tau=tau, q_ref=q_ref, moment=moment)
 
 
 def _moment(

@@ -168,8 +168,6 @@ impl Request<'_> {
         };
         let mut candidates = candidates(&arm, &theta, &training.data.tracks, self.options.known_units);
         if let Some(controller) = &controller {
-            // Position noise limits the accuracy of a controller's torque, and so of a deflection computed from this torque.
-            candidates.retain(|group| !matches!(group[0].kind, TermKind::Transmission(_)));
             let inertia = training.equation.mean_inertia(&theta);
             let period = training.data.tracks.first().map_or(0.0, Track::period);
             candidates.extend(controller_settings(controller, &inertia, period));

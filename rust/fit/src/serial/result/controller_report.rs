@@ -18,12 +18,7 @@ pub(in crate::serial) fn with_settings(
     joints
 }
 
-/// Joint elasticity and backlash, by name in results and in words for sentences: neither effect is tested in logs without torques, and both change
-/// the damping of a control loop as a wrong derivative gain does.
-const NOT_TESTED: [(&str, &str); 2] = [("joint_elasticity", "a shaft that twists"), ("backlash", "backlash")];
-
-/// Look-alikes of a cause that no log of references and positions distinguishes from it, and effects that such logs cannot test for and that change
-/// the motion as the cause does.
+/// Look-alikes of a cause that no log of references and positions distinguishes from it.
 pub(in crate::serial) fn behind_controller(
     cause: &Cause,
     controller: &PositionController,
@@ -53,14 +48,7 @@ pub(in crate::serial) fn behind_controller(
                 "viscous_friction",
                 "on the measured velocity the derivative gain acts as viscous friction does".to_owned(),
             );
-            let transmissions = NOT_TESTED.map(|(effect, what)| {
-                why(
-                    effect,
-                    format!("{what} changes the damping of the loop, and is not tested without torques"),
-                )
-            });
-            let on_velocity = (!of.rate_of_error).then_some(friction);
-            on_velocity.into_iter().chain(transmissions).collect()
+            (!of.rate_of_error).then_some(friction).into_iter().collect()
         }
         _ => Vec::new(),
     }
@@ -119,9 +107,9 @@ mod tests {
     }
 
     #[test]
-    fn another_damping_may_be_friction_or_a_transmission_that_gives_way() {
-        assert_eq!(alike("controller_damping", false), ["viscous_friction", "joint_elasticity", "backlash"]);
-        assert_eq!(alike("controller_damping", true), ["joint_elasticity", "backlash"]);
+    fn another_damping_on_the_measured_velocity_may_be_friction() {
+        assert_eq!(alike("controller_damping", false), ["viscous_friction"]);
+        assert!(alike("controller_damping", true).is_empty());
     }
 
     #[test]

@@ -71,7 +71,7 @@ pub(in crate::serial) fn in_gap(drives: &[Drive], gap: f64) -> Vec<[f64; 2]> {
     let across = |drive: &Drive| {
         let (h, acceleration) = (drive.h, drive.torque / drive.inertia);
         let free = x + h * (rate + 0.5 * h * acceleration);
-        let next = free.clamp(-half, half);
+        let next = free.min(half).max(-half);
         rate = if next == free { rate + h * acceleration } else { 0.0 };
         let middle = [0.5 * (x + next), (next - x) / h];
         x = next;

@@ -285,7 +285,7 @@ impl<'a> Regression<'a> {
 
     /// First-order (score) test of further torques, each of size 1 in `columns`, against the residual of the estimate `at`, with the parameters
     /// re-estimated at the same time; `ridge` is the prior precision (inverse variance) of each torque's size around zero. `None` if a matrix is
-    /// singular.
+    /// singular or a torque is not finite.
     pub fn score(&self, at: &Estimate, columns: &[Signal], ridge: &[f64]) -> Option<Score> {
         let k = columns.len();
         let fixed = self.fixed();
@@ -305,7 +305,8 @@ impl<'a> Regression<'a> {
         let inverse = crate::likelihood::solve::scaled_inverse(&held)?;
         let size = &inverse * &slope;
         let gain = slope.dot(&size);
-        Some(Score { size: size.iter().copied().collect(), gain, information, inverse, solved })
+        let is_finite = gain.is_finite() && size.iter().all(|size| size.is_finite());
+        is_finite.then(|| Score { size: size.iter().copied().collect(), gain, information, inverse, solved })
     }
 
     /// Covariance of the sizes of further torques, each of size 1 in `columns`, from the scatter of their scores over blocks, at an estimate that
