@@ -318,7 +318,7 @@ const GROUP: usize = 4 * WIDTH;
 
 /// Adds latent states to a state whose positions are those that the encoders show: where the encoder is on the motor, the deflection is subtracted
 /// from the shown position to give that of the link.
-fn enter<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+pub(crate) fn enter<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     plant: &Plant<f64, A, N, P>,
     state: &mut State<f64, N>,
     latent: &LatentState<f64, N>,

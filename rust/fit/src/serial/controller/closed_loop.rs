@@ -6,7 +6,8 @@
 //! these are the controllers' torques along the measured path.
 
 use crate::model::hypothesis::{EffectInstance, Hypothesis};
-use crate::predict::window::{DIVERGED, Dataset, Window};
+use crate::predict::log_inputs::LogInputs;
+use crate::predict::window::{DIVERGED, Dataset, Window, enter};
 use crate::serial::controller::{Given, JointController};
 use armgap_core::arm::Arm;
 use armgap_core::effect::{InputSegment, Quantity, find};
@@ -148,32 +149,37 @@ impl<const N: usize> ClosedLoop<N> {
                 (0..N).map(servo).collect()
             })
             .collect();
+        let inputs = LogInputs::new(data, hypothesis, &plant, None);
         let mut rest = predicted.as_mut_slice();
         let mut runs = Vec::with_capacity(data.windows.len());
         for window in &data.windows {
             let (positions, after) = rest.split_at_mut(window.rows() * N);
             rest = after;
-            runs.push((window, positions));
+            let Window { initial_state, track, first, .. } = window;
+            let mut state = hypothesis.initial_state(initial_state.q, initial_state.dq);
+            if let Some(states) = inputs.latent(*track) {
+                enter(&plant, &mut state, &states[*first]);
+            }
+            runs.push((window, state, positions));
         }
-        runs.into_par_iter().for_each(|(window, positions)| {
+        runs.into_par_iter().for_each(|(window, state, positions)| {
             if let Some(servos) = &servos[window.track] {
-                run(&plant, hypothesis, servos, &data.tracks[window.track].t, window, positions);
+                run(&plant, hypothesis, servos, &data.tracks[window.track].t, (window, state), positions);
             }
         });
         predicted
     }
 }
 
-/// Simulates one window of a log and writes the predicted positions, rad or m, sample by sample and joint by joint, into `positions`.
+/// Simulates one window of a log, from a state at its start, and writes the predicted positions, rad or m, sample by sample and joint by joint, into `positions`.
 fn run<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     plant: &Plant<f64, A, N, P>,
     hypothesis: &Hypothesis<P>,
     servos: &[Servo],
     t: &[f64],
-    window: &Window<N>,
+    (window, mut state): (&Window<N>, State<f64, N>),
     positions: &mut [f64],
 ) {
-    let mut state = hypothesis.initial_state(window.initial_state.q, window.initial_state.dq);
     let mut past: Vec<Past> = servos.iter().map(|servo| servo.past(t, window.first)).collect();
     let mut ddq = SVector::<f64, N>::zeros();
     let mut integral: Vec<f64> = servos.iter().map(|servo| servo.integral[window.first].start).collect();
@@ -183,11 +189,12 @@ fn run<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         let period = h / count as f64;
         for i in 0..count {
             let (halfway, now) = ((i as f64 + 0.5) / count as f64, t[k] + i as f64 * period);
-            let expected = state.q + 0.5 * period * state.dq;
-            let expected = State { q: expected, dq: state.dq + 0.5 * period * ddq, ..state };
+            let mut expected =
+                State { q: state.q + 0.5 * period * state.dq, dq: state.dq + 0.5 * period * ddq, ..state };
+            expected.latent.deflection += 0.5 * period * state.latent.deflection_rate;
             let torque = std::array::from_fn(|j| {
                 let servo = &servos[j];
-                let (q, dq) = shown(hypothesis, &expected, j);
+                let (q, dq) = shown(plant, hypothesis, &expected, j);
                 let error = servo.reference[k].at(halfway) - q;
                 let inputs =
                     [servo.controller.proportional(error), servo.rate[k].at(halfway) - dq, integral[j]];
@@ -203,18 +210,22 @@ fn run<A: Arm<f64, N, P>, const N: usize, const P: usize>(
             break;
         }
         for (j, q) in row.iter_mut().enumerate() {
-            *q = hypothesis.measured(j, state.q[j]);
+            *q = shown(plant, hypothesis, &state, j).0;
         }
     }
 }
 
 /// Position, rad or m, and velocity, rad/s or m/s, that the encoder of joint `j` shows in a simulated state.
-fn shown<const N: usize, const P: usize>(
+fn shown<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    plant: &Plant<f64, A, N, P>,
     hypothesis: &Hypothesis<P>,
     state: &State<f64, N>,
     j: usize,
 ) -> (f64, f64) {
-    let (q, dq) = (state.q[j], state.dq[j]);
+    let (mut q, mut dq) = (state.q[j], state.dq[j]);
+    if plant.drivetrain().sides(j).encoder_at_motor {
+        (q, dq) = (q + state.latent.deflection[j], dq + state.latent.deflection_rate[j]);
+    }
     if hypothesis.distorts() { (hypothesis.measured(j, q), dq * hypothesis.stretch(j, q)) } else { (q, dq) }
 }
 
@@ -230,7 +241,9 @@ fn periods<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     let inertia = plant.rigid().equation_terms(&joints).inertia;
     let free = SMatrix::<f64, N, N>::from_fn(|i, j| inertia[i][j]).try_inverse();
     let rate = |(j, servo): (usize, &Servo)| {
-        let mobility = free.as_ref().map_or(0.0, |free| free[(j, j)].max(0.0));
+        let joint = free.as_ref().map_or(0.0, |free| free[(j, j)].max(0.0));
+        // A motor behind a transmission answers to its controller alone.
+        let mobility = plant.drivetrain().get(j).map_or(joint, |t| joint.max(1.0 / t.inertia));
         let [kp, kd, _] = servo.controller.gains.map(f64::abs);
         (kp * mobility).sqrt() + kd * mobility
     };
@@ -325,6 +338,33 @@ mod tests {
         let law = find::<f64>("actuator_delay").unwrap();
         let effect = predicted(SERVO, vec![EffectInstance::new(law, 0, [0.008, 0.0, 0.0])]);
         assert!(apart(&effect, &wanted) < STEPPED, "{}", apart(&effect, &wanted));
+    }
+
+    #[test]
+    fn a_servo_that_measures_its_motor_moves_a_link_behind_a_shaft() {
+        let [stiffness, damping, rotor] = [150.0, 0.8, 0.1];
+        let law = find::<f64>("joint_elasticity").unwrap();
+        let shaft = EffectInstance::new(law, 0, [stiffness, damping, rotor]).with_sides(Sides::MOTOR);
+        let found = predicted(SERVO, vec![shaft]);
+        // Motor and link by explicit steps; the servo, its friction and its encoder are at the motor.
+        let steps = 250;
+        let dt = PERIOD / f64::from(steps);
+        let ([mut motor, mut link], [mut of_motor, mut of_link]) = ([0.0_f64; 2], [0.0_f64; 2]);
+        let mut wanted = Vec::new();
+        for k in 0..159 {
+            for _ in 0..steps {
+                let passed = stiffness * (motor - link) + damping * (of_motor - of_link);
+                let [kp, kd, _] = SERVO.gains;
+                let torque = kp * (target(k) - motor) - kd * of_motor;
+                of_motor += dt * (torque - VISCOUS * of_motor - passed) / rotor;
+                of_link += dt * passed / INERTIA;
+                motor += dt * of_motor;
+                link += dt * of_link;
+            }
+            wanted.push(motor);
+        }
+        let [off, rigid] = [&found, &stepped(&SERVO, last)].map(|other| apart(other, &wanted));
+        assert!(off < 0.02 * rigid, "{off} beside {rigid} of a rigid joint");
     }
 
     #[test]
