@@ -92,7 +92,7 @@ def test_every_verdict_answers_in_its_own_words() -> None:
 
 
 def test_a_serial_arm_without_a_cause_is_told_what_was_not_tested() -> None:
-    """Elastic joints and backlash are tested where torques are logged, and not on logs of references: the diagnosis says which."""
+    """A diagnosis of a serial arm lists the effects that were not tested, once each."""
     data = copy.deepcopy(cases.unexplained().to_dict())
     data["arm"]["kind"] = "serial"
     untested = {"status": "undecided", "why": "not tested on serial arms from such logs"}

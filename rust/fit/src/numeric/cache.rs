@@ -25,6 +25,10 @@ impl<K: PartialEq + Clone, V> Cache<K, V> {
         }
         let result = Arc::new(compute());
         let mut all = kept();
+        // Another thread may have computed the same meanwhile.
+        if let Some((_, known)) = all.iter().find(|(key, _)| key == at) {
+            return Arc::clone(known);
+        }
         if all.len() == KEPT {
             all.pop_front();
         }

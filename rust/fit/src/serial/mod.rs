@@ -168,6 +168,10 @@ impl Request<'_> {
         };
         let mut candidates = candidates(&arm, &theta, &training.data.tracks, self.options.known_units);
         if let Some(controller) = &controller {
+            // What a controller commanded before the log is unknown, and with it which flank a motor begins on.
+            for group in &mut candidates {
+                group.retain(|term| !term.is_backlash_of_link_encoder());
+            }
             let inertia = training.equation.mean_inertia(&theta);
             let period = training.data.tracks.first().map_or(0.0, Track::period);
             candidates.extend(controller_settings(controller, &inertia, period));
@@ -249,7 +253,7 @@ fn controller_settings(controller: &PositionController, inertia: &[f64], period:
 /// Largest number of half cycles over the travel of a joint among the initial guesses of a torque ripple.
 const HALF_CYCLES: usize = 80;
 
-/// Every candidate term of an arm without controllers, at each of its initial guesses, grouped by effect and joint. Left out are effects of the
+/// Every candidate term besides settings of controllers, at each of its initial guesses, grouped by effect and joint. Left out are effects of the
 /// library that simulate a motor as a body separate from its link (the weak form has terms of its own for transmissions), external disturbances, and
 /// effects on the whole arm, which are stated for arms in a plane.
 fn candidates<const N: usize, const P: usize>(

@@ -18,7 +18,7 @@ const NORMAL_95_ONE_SIDED: f64 = 1.645;
 const NOT_EXCITED: f64 = 0.2;
 
 /// RMS of the torque that a model leaves unexplained, relative to the joint's RMS torque, above which joint elasticity and backlash are undecided:
-/// first-order tests may miss what these effects do beyond first order.
+/// they are tested at some stiffnesses and gaps alone, and what they do at others may be something else.
 const HIDES: f64 = 0.01;
 
 const NOT_TESTED: &str = "not tested on serial arms from such logs";
@@ -124,10 +124,10 @@ pub(in crate::serial) fn ruled_out(
         let tested = found.tested.iter().map(|t| &t.term).chain(found.named.iter().map(|n| &n.term));
         tested.into_iter().any(|t| t.name() == name && t.row().is_none() && t.joints().contains(&(j + 1)))
     };
-    let hidden_from_encoders = |law: &&&'static dyn Effect<f64>| {
-        law.has_transmission() || law.spec().scope == Scope::Joint && law.spec().trial == Trial::Disturbance
+    let is_disturbance = |law: &&&'static dyn Effect<f64>| {
+        law.spec().scope == Scope::Joint && law.spec().trial == Trial::Disturbance
     };
-    for law in catalogue::<f64>().iter().filter(hidden_from_encoders) {
+    for law in catalogue::<f64>().iter().filter(is_disturbance) {
         let open = (0..rotary.len()).filter(|j| !is_tested(law.spec().name, *j));
         all.extend(open.map(|j| RuledOut {
             effect: law.spec().name,
@@ -176,15 +176,13 @@ fn status(found: &Found, unexplained: &[Option<f64>], tested: &Tested, rotary: &
         && let Some(left) = unexplained[law.joint].filter(|left| *left > HIDES)
     {
         let why = format!(
-            "its test is to first order, and {:.1} % of the joint's torque is unexplained",
+            "tested at some stiffnesses and gaps alone, and {:.1} % of the joint's torque is unexplained",
             100.0 * left
         );
         return entry(Status::Undecided, None, Some(why));
     }
     let parameters = term.parameters(rotary_of(term, rotary));
-    // The torque of a deflection is nearly in proportion to it.
-    let is_scaled = term.amplitudes() > 0 || matches!(term.kind, TermKind::Transmission(_));
-    let bound = (is_scaled && !matches!(term.kind, TermKind::NominalLink(_)))
+    let bound = (term.amplitudes() > 0 && !matches!(term.kind, TermKind::NominalLink(_)))
         .then(|| {
             let p = parameters.first()?;
             let value = (largest * (term.p[0] - p.neutral)).abs();

@@ -6,9 +6,10 @@ use crate::serial::search::fitting::Fitted;
 use crate::serial::search::screening::Guess;
 use crate::serial::search::tables::{beside_rival, left_by_rival};
 use crate::serial::search::{Found, Named, Search, Tested};
-use crate::serial::term::Term;
+use crate::serial::term::{Term, TermKind};
 use crate::serial::weak_form::rows::{JointRows, Regression};
 use armgap_core::chain::LINK_PARAMETERS;
+use rayon::prelude::*;
 
 impl Search<'_> {
     /// Results of a model search: probabilities and look-alikes of the model's terms, and tests of the terms that are not in the model.
@@ -140,21 +141,31 @@ impl Search<'_> {
     /// First-order tests, in addition to the terms of the model, of every candidate whose joint and effect are not in the model.
     fn tested(&self, guesses: &[Vec<Guess>], regression: &Regression, model: &Fitted) -> Vec<Tested> {
         let screened = self.screened(guesses, regression, model);
-        let open = self.candidates.iter().filter_map(|group| group.first());
-        open.filter(|term| !model.terms.iter().any(|t| t.same_place(term)))
-            .map(|first| {
-                let found = screened.iter().find(|(t, _)| t.same_place(first));
-                let term = found.map_or_else(|| first.clone(), |(t, _)| t.clone());
-                let signal = self.training.signal(&term, &model.estimate.theta);
-                let column = std::slice::from_ref(&signal);
-                let score = regression.score(&model.estimate, column, &[0.0]);
-                let size = score.map_or([0.0, f64::INFINITY], |score| {
-                    let sigma = regression.sandwich(&model.estimate, column, &score)[(0, 0)].max(0.0).sqrt();
-                    [score.size[0], sigma]
-                });
-                let consequence = consequence(self.training.rows(), &signal);
-                Tested { term, size, consequence }
-            })
-            .collect()
+        let tested = |term: Term| {
+            let signal = self.training.signal(&term, &model.estimate.theta);
+            let column = std::slice::from_ref(&signal);
+            let score = regression.score(&model.estimate, column, &[0.0]);
+            let size = score.map_or([0.0, f64::INFINITY], |score| {
+                let sigma = regression.sandwich(&model.estimate, column, &score)[(0, 0)].max(0.0).sqrt();
+                [score.size[0], sigma]
+            });
+            let consequence = consequence(self.training.rows(), &signal);
+            Tested { term, size, consequence }
+        };
+        let open = |first: &Term| !model.terms.iter().any(|t| t.same_place(first));
+        let of_group = |group: &Vec<Term>| -> Option<Tested> {
+            let first = group.first().filter(|first| open(first))?;
+            if let Some((term, _)) = screened.iter().find(|(t, _)| t.same_place(first)) {
+                return Some(tested(term.clone()));
+            }
+            if !matches!(first.kind, TermKind::Transmission(_)) {
+                return Some(tested(first.clone()));
+            }
+            // Deflections at different stiffnesses and gaps are different motions: the least certain one counts.
+            let uncertain = |t: &Tested| t.size[1] * t.consequence;
+            let all = group.iter().map(|term| tested(term.clone())).filter(|t| t.consequence > 0.0);
+            all.max_by(|a, b| uncertain(a).total_cmp(&uncertain(b))).or_else(|| Some(tested(first.clone())))
+        };
+        self.candidates.par_iter().filter_map(of_group).collect()
     }
 }

@@ -14,7 +14,7 @@ use crate::serial::term::controller_term::{ControllerTerm, Setting};
 use crate::serial::term::row_term::{RowLaw, RowTerm};
 use crate::serial::term::several_joints::SeveralJoints;
 use crate::serial::term::table::Table;
-use crate::serial::term::transmission::TransmissionLaw;
+use crate::serial::term::transmission::{Compliance, TransmissionLaw};
 use armgap_core::chain::LINK_NAMES;
 use armgap_core::effect::{JointPoint, Quantity, Scope, Trial};
 
@@ -146,6 +146,12 @@ impl Term {
             TermKind::Joints(of) => of.members.iter().flat_map(Self::own_motors).collect(),
             _ => Vec::new(),
         }
+    }
+
+    /// Whether the term is backlash of a joint whose encoder measures the link.
+    pub fn is_backlash_of_link_encoder(&self) -> bool {
+        let TermKind::Transmission(law) = self.kind else { return false };
+        law.compliance == Compliance::Backlash && !law.encoder_at_motor
     }
 
     /// Factors (1 and 1, or 1 and -1) of two adjacent joints' positions in the sum or difference that the term acts along; `None` for terms of other

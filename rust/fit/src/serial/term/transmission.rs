@@ -6,13 +6,13 @@
 
 use crate::model::hypothesis::EffectInstance;
 use crate::numeric::cache::Cache;
-use crate::serial::term::deflection::{self, Drive};
+use crate::serial::term::deflection::{self, Forcing};
 use crate::serial::term::{Term, TermKind, TermParameter};
 use crate::serial::weak_form::equation::Equation;
 use crate::serial::weak_form::intervals::{Intervals, Middle};
 use crate::serial::weak_form::rows::Signal;
 use armgap_core::arm::Arm;
-use armgap_core::effect::{Effect, find};
+use armgap_core::effect::{Effect, NEVER, find};
 use armgap_core::kinematics::JointState;
 use armgap_core::transmission::Sides;
 use nalgebra::SVector;
@@ -51,17 +51,21 @@ pub enum Compliance {
     Backlash,
 }
 
-/// Least and largest damping ratio of an elastic joint's oscillation in predictions: beyond them the estimate is taken as uncertain.
+/// Least and largest damping ratio of the rotor on its shaft in predictions: beyond them the estimate is taken as uncertain.
 const DAMPING: [f64; 2] = [0.02, 1.0];
 
-/// Natural frequencies of a link on its shaft among the initial guesses of an elastic joint, rad/s: from the softest drives to those whose deflection
-/// follows the torque within the test functions, in steps in which neighbours still explain most of each other's deflection.
-const SHAFT_FREQUENCIES: [f64; 8] = [8.0, 12.0, 18.0, 27.0, 40.0, 60.0, 120.0, 240.0];
+/// Natural frequencies of a joint's inertia on its shaft among the initial guesses of an elastic joint, rad/s: from the softest drives to those of which test
+/// functions see only that the deflection follows the torque. Up to 60 rad/s neighbours still explain most of each other's deflection; beyond, the
+/// deflection is in proportion to the compliance, and steps of four are enough.
+const LINK_FREQUENCIES: [f64; 10] = [8.0, 12.0, 18.0, 27.0, 40.0, 60.0, 120.0, 240.0, 480.0, 960.0];
 
 /// Damping ratio of a link on its shaft among the initial guesses of an elastic joint.
-const SHAFT_DAMPING: f64 = 0.1;
+const LINK_DAMPING: f64 = 0.1;
 
-/// Rotor inertia that is assumed for a motor without one in the arm file, relative to the joint's inertia.
+/// Gaps among the initial guesses of backlash, relative to the standard deviation of the joint's positions: a fit finds a gap within a factor of two.
+const GAPS: [f64; 7] = [0.0025, 0.005, 0.01, 0.02, 0.04, 0.08, 0.16];
+
+/// Rotor inertia that predictions assume for a motor without one in the arm file, relative to the joint's inertia.
 const ROTOR_SHARE: f64 = 0.03;
 
 impl TransmissionLaw {
@@ -85,22 +89,18 @@ impl TransmissionLaw {
     }
 
     /// Candidate terms of the law at its initial guesses; `scale` is the size of the joint's positions, rad or m, by which gaps are guessed, and
-    /// `inertia` the joint's inertia, kg m^2 (kg), by which stiffnesses are.
+    /// `inertia` the joint's inertia with its rotor, kg m^2 (kg), by which stiffnesses are.
     pub fn guesses(self, scale: f64, inertia: f64) -> Vec<Term> {
         let term = |p: Vec<f64>| Term::neutral(TermKind::Transmission(self)).with(p);
         match self.compliance {
-            Compliance::Elastic => SHAFT_FREQUENCIES
+            Compliance::Elastic => LINK_FREQUENCIES
                 .iter()
                 .map(|frequency| {
                     let compliance = 1.0 / (inertia * frequency * frequency);
-                    term(vec![compliance, 2.0 * SHAFT_DAMPING / frequency])
+                    term(vec![compliance, 2.0 * LINK_DAMPING / frequency])
                 })
                 .collect(),
-            Compliance::Backlash => {
-                let mut gaps: Vec<f64> = self.effect().spec().initial_guesses.iter().map(|p| p[0]).collect();
-                gaps.dedup();
-                gaps.into_iter().map(|gap| term(vec![gap * scale])).collect()
-            }
+            Compliance::Backlash => GAPS.iter().map(|gap| term(vec![gap * scale])).collect(),
         }
     }
 
@@ -114,14 +114,14 @@ impl TransmissionLaw {
         match self.compliance {
             Compliance::Elastic => vec![
                 of("compliance", ["rad/(N m)", "m/N"], Some(("stiffness", ["N m/rad", "N/m"]))),
-                of("retardation_time", ["s", "s"], None),
+                TermParameter { neutral: NEVER, ..of("retardation_time", ["s", "s"], None) },
             ],
             Compliance::Backlash => vec![of("gap", ["rad", "m"], None)],
         }
     }
 
     /// Damping, N m s/rad (N s/m), of a transmission with the parameters `p`, and the damping's standard deviation from those of the parameters,
-    /// `sigma`; `None` for backlash, or without a compliance.
+    /// `sigma`, taken as uncorrelated; `None` for backlash, or without a compliance.
     pub fn damping(p: &[f64], sigma: &[f64]) -> Option<[f64; 2]> {
         let (compliance, retardation) = (*p.first()?, *p.get(1)?);
         let damping = retardation / compliance;
@@ -163,15 +163,17 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         p: &[f64],
         theta: &[f64; P],
     ) -> Signal {
-        if p[0] == 0.0 {
+        let (j, rotor) = (law.joint, theta[10 * N + law.joint]);
+        if p[0] == 0.0 || !law.encoder_at_motor && rotor <= 0.0 {
             return vec![None; N];
         }
-        let (j, drives) = (law.joint, self.computed.drives.of(&(*law, *theta), || self.drives(law, theta)));
-        let along = |drives: &Vec<Drive>| match law.compliance {
-            Compliance::Elastic => deflection::of_shaft(drives, p[0], p[1]),
-            Compliance::Backlash => deflection::in_gap(drives, p[0]),
+        let needs = self.computed.needs.of(theta, || self.link_needs(theta));
+        let Some(forcings) = self.forcings(law, theta, &needs) else { return vec![None; N] };
+        let along = |forcings: &Vec<Forcing>| match law.compliance {
+            Compliance::Elastic => deflection::of_shaft(forcings, p[0], p[1]),
+            Compliance::Backlash => deflection::in_gap(forcings, p[0]),
         };
-        let deflections: Vec<Vec<[f64; 2]>> = drives.iter().map(along).collect();
+        let deflections: Vec<Vec<[f64; 2]>> = forcings.iter().map(along).collect();
         if !law.encoder_at_motor {
             return self.of_motor(j, &deflections, theta);
         }
@@ -180,24 +182,48 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         self.weak_parts(&Self::behind_motors(&deflections, &derivatives))
     }
 
-    /// What drives the deflection of a transmission along the logs.
-    fn drives(&self, law: &TransmissionLaw, theta: &[f64; P]) -> Vec<Vec<Drive>> {
-        let j = law.joint;
+    /// What the links need along the logs, without rotors and friction: the torques on all joints, N m or N, and the diagonal of the inertia matrix,
+    /// kg m^2 or kg.
+    fn link_needs(&self, theta: &[f64; P]) -> LinkNeeds<N> {
         let links = Self::links(theta);
+        let rigid = self.rigid(&links);
         let at = |m: &Middle<N>| {
-            let inertia = self.arm.inertia(&links, &SVector::from(m.q))[(j, j)];
-            let (torque, inertia) = match (law.encoder_at_motor, law.compliance) {
-                (true, _) => (self.link_torque(m, &links)[j], inertia),
-                // The link's motion is known, and with it what the shaft passes on.
-                (false, Compliance::Elastic) => (self.link_torque(m, &links)[j], 0.0),
-                (false, Compliance::Backlash) => {
-                    let rotor = theta[10 * N + j];
-                    (self.motor_torque(m, j, theta), if rotor > 0.0 { rotor } else { ROTOR_SHARE * inertia })
-                }
-            };
-            Drive { h: m.h, torque, inertia }
+            let inertia = self.arm.inertia(&links, &SVector::from(m.q));
+            let bias = rigid.equation_terms(&JointState { q: m.q, dq: m.dq }).bias;
+            [inertia * SVector::from(m.ddq) + SVector::from(bias), inertia.diagonal()]
         };
         self.logs().iter().map(|log| log.middles.par_iter().map(at).collect()).collect()
+    }
+
+    /// What forces the deflection of a transmission along the logs; `None` where a body that crosses a gap has no positive inertia.
+    fn forcings(
+        &self,
+        law: &TransmissionLaw,
+        theta: &[f64; P],
+        needs: &LinkNeeds<N>,
+    ) -> Option<Vec<Vec<Forcing>>> {
+        let j = law.joint;
+        let at = |(m, [torque, inertia]): (&Middle<N>, &[SVector<f64, N>; 2])| {
+            let (torque, inertia) = match (law.encoder_at_motor, law.compliance) {
+                // An estimate may leave the links without inertia for some poses; a shaft then follows its torque.
+                (true, Compliance::Elastic) => {
+                    return Some(Forcing { h: m.h, torque: torque[j], inertia: inertia[j].max(0.0) });
+                }
+                (true, Compliance::Backlash) => (torque[j], inertia[j]),
+                // The link's motion is known, and with it what the shaft passes on.
+                (false, Compliance::Elastic) => {
+                    return Some(Forcing { h: m.h, torque: torque[j], inertia: 0.0 });
+                }
+                // A motor at rest has unknown friction: it carries what the link needs.
+                (false, Compliance::Backlash) if m.rest[j] => (torque[j], theta[10 * N + j]),
+                (false, Compliance::Backlash) => (self.motor_torque(m, j, theta), theta[10 * N + j]),
+            };
+            (inertia > 0.0).then_some(Forcing { h: m.h, torque, inertia })
+        };
+        let along = |(log, needs): (&Intervals<N>, &Vec<[SVector<f64, N>; 2]>)| {
+            log.middles.iter().zip(needs).map(at).collect::<Option<Vec<Forcing>>>()
+        };
+        self.logs().iter().zip(needs).map(along).collect()
     }
 
     /// The arm's parameters without rotor inertias and friction.
@@ -211,13 +237,6 @@ impl<const N: usize, const P: usize> Equation<N, P> {
     fn motor_torque(&self, m: &Middle<N>, j: usize, theta: &[f64; P]) -> f64 {
         let friction = self.arm.friction(theta, &SVector::from(m.dq))[j];
         m.tau[j] - theta[10 * N + j] * m.ddq[j] - friction
-    }
-
-    /// Torque of the links on all joints along the measured motion, without rotors and friction, N m or N.
-    fn link_torque(&self, m: &Middle<N>, links: &[f64; P]) -> SVector<f64, N> {
-        let inertia = self.arm.inertia(links, &SVector::from(m.q));
-        let bias = self.rigid(links).equation_terms(&JointState { q: m.q, dq: m.dq }).bias;
-        inertia * SVector::from(m.ddq) + SVector::from(bias)
     }
 
     /// Change of the links' torque by joint and row of the weak form, to first order, where the encoder of joint `j` measures the motor and the link
@@ -304,11 +323,14 @@ impl<const N: usize, const P: usize> Equation<N, P> {
     }
 }
 
+/// Torques that the links need on all joints, and the diagonal of their inertia matrix, by log and sample interval.
+type LinkNeeds<const N: usize> = Vec<Vec<[SVector<f64, N>; 2]>>;
+
 /// What the last evaluations of transmissions computed along the logs; a fit needs each of these at several values.
 #[derive(Debug, Default)]
 pub struct Computed<const N: usize, const P: usize> {
-    /// What drives the deflection of a transmission, log by log.
-    drives: Cache<(TransmissionLaw, [f64; P]), Vec<Vec<Drive>>>,
+    /// What the links need along the logs.
+    needs: Cache<[f64; P], LinkNeeds<N>>,
     /// Derivatives of the links' torques by the position and velocity of a joint.
     derivatives: Cache<(usize, [f64; P]), LinkDerivatives<N>>,
 }

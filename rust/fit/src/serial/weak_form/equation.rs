@@ -347,19 +347,16 @@ impl<const N: usize, const P: usize> Equation<N, P> {
     /// Torque by joint and row of the weak form, N m or N, due to changes of the momentum and of the torque without the momentum's derivative, given
     /// by log and sample interval.
     pub(in crate::serial) fn weak_parts(&self, changes: &[Vec<[SVector<f64, N>; 2]>]) -> Signal {
-        let joint = |joint: usize| {
-            let row = |i: &usize| {
-                let phi = &self.functions[*i];
-                let log = &self.logs[phi.log];
-                let part = |k: usize| {
-                    let ([momentum, rest], m) = (&changes[phi.log][k], &log.middles[k]);
-                    phi.weight(m) * rest[joint] - phi.rise(m) * momentum[joint]
-                };
-                phi.reach().map(part).sum()
+        let averaged = |phi: &TestFunction| -> SVector<f64, N> {
+            let log = &self.logs[phi.log];
+            let part = |k: usize| {
+                let ([momentum, rest], m) = (&changes[phi.log][k], &log.middles[k]);
+                rest * phi.weight(m) - momentum * phi.rise(m)
             };
-            Some(self.kept[joint].iter().map(row).collect())
+            phi.reach().map(part).sum()
         };
-        (0..N).map(joint).collect()
+        let averages: Vec<SVector<f64, N>> = self.functions.iter().map(averaged).collect();
+        (0..N).map(|j| Some(self.kept[j].iter().map(|i| averages[*i][j]).collect())).collect()
     }
 
     /// Sample intervals of the logs, log by log.
