@@ -53,7 +53,7 @@ check-lints:
 	PYO3_PYTHON=$(CURDIR)/$(BIN)/python cargo clippy -q --release -p armgap-core -p armgap-fit -p armgap-capi -p armgap-py -- -D warnings
 
 check-tests:
-	$(BIN)/python -m pytest -m "not slow"
+	$(BIN)/python -m pytest -m "not slow" -n auto
 
 licences: setup ## write docs/licences.md from the dependencies
 	$(BIN)/python tools/licences.py docs/licences.md
