@@ -28,6 +28,9 @@ use crate::serial::term::Term;
 use crate::serial::{SerialArm, Set};
 use armgap_core::chain::Chain;
 
+/// Reason why an elastic joint or backlash is not named where predictions have to confirm it.
+const PREDICTS_NO_BETTER: &str = "the arm with it predicts the holdout no better than without it";
+
 /// Reason why causes are not named beside which the arm predicts the holdout worse than the re-estimated arm.
 const PREDICTS_WORSE: &str =
     "the arm with what was found predicts the holdout worse than the re-estimated arm does without it";
@@ -75,16 +78,26 @@ pub(crate) fn assemble<const N: usize, const P: usize>(
         let refit = missed(1);
         closed(&refit, errors, &floor) < 0.0 && is_improved(errors, &refit, &floor)
     };
-    let worse = is_worse(&missed(2));
+    let (worse, refit_missed) = (is_worse(&missed(2)), missed(1));
     // Deflections of elastic joints and backlash are not measured, so that predictions say little about these causes; they still judge the others.
     let (hidden, others): (Vec<Term>, Vec<Term>) =
         found.reported.terms.iter().cloned().partition(|term| !term.own_motors().is_empty());
-    let others_are_worse = || {
-        let model = model_of(arm, holdout, &found.reported.estimate.theta, &others);
-        is_worse(&rms::<N>(&measured, &limited(&measured, &model.predict(data))))
-    };
-    let contradicted = worse && (hidden.is_empty() || !others.is_empty() && others_are_worse());
-    let (named, candidates) = causes(found, contradicted, &rotary, commanded);
+    let beside = model_of(arm, holdout, &found.reported.estimate.theta, &others);
+    let predicted_beside = if hidden.is_empty() { predicted[2].clone() } else { beside.predict(data) };
+    let missed_beside = rms::<N>(&measured, &limited(&measured, &predicted_beside));
+    let contradicted = worse && (hidden.is_empty() || !others.is_empty() && is_worse(&missed_beside));
+    // Torques of position controllers contain the encoders' noise, which a shaft may seem to filter; there predictions have to confirm it.
+    let unconfirmed = commanded.is_some()
+        && !hidden.is_empty()
+        && !is_improved(if others.is_empty() { &refit_missed } else { &missed_beside }, &missed(2), &floor);
+    if unconfirmed {
+        (models[2], predicted[2]) = if others.is_empty() {
+            (models[1].clone(), predicted[1].clone())
+        } else {
+            (beside, predicted_beside)
+        };
+    }
+    let (named, candidates) = causes(found, [contradicted, unconfirmed], &rotary, commanded);
     let reported = if contradicted { &found.refit_feasible } else { &found.reported };
     if contradicted {
         let (model, prediction) = (models[1].clone(), predicted[1].clone());
@@ -112,7 +125,7 @@ pub(crate) fn assemble<const N: usize, const P: usize>(
     let (free_run_series, free_run) = free_runs(&compared, data);
     gap.free_run = free_run;
     let mut notes = notes(found, training, holdout, &rotary);
-    notes.extend((worse && !contradicted).then(|| HIDDEN_STATES.to_owned()));
+    notes.extend((worse && !contradicted && !unconfirmed).then(|| HIDDEN_STATES.to_owned()));
     notes.extend(gap.training.as_ref().map(|errors| remark(errors, &rotary)));
     Diagnosis {
         schema: "armgap.diagnosis/1",
@@ -141,13 +154,7 @@ pub(crate) fn assemble<const N: usize, const P: usize>(
             position_sigma: noise.to_vec(),
             encoder_step: training.data.tracks.first().map_or_else(Vec::new, |t| t.step.to_vec()),
         },
-        options: OptionSummary {
-            horizon_s: options.horizon,
-            max_causes: options.max_causes,
-            seed: options.seed,
-            friction_smoothing: 0.0,
-            friction_widths: vec![0.0; N],
-        },
+        options: options_summary::<N>(options),
         version: env!("CARGO_PKG_VERSION"),
         seconds: 0.0,
         notes,
@@ -155,16 +162,35 @@ pub(crate) fn assemble<const N: usize, const P: usize>(
     }
 }
 
+/// Options of a diagnosis of `N` joints as results state them.
+fn options_summary<const N: usize>(options: &Options) -> OptionSummary {
+    OptionSummary {
+        horizon_s: options.horizon,
+        max_causes: options.max_causes,
+        seed: options.seed,
+        friction_smoothing: 0.0,
+        friction_widths: vec![0.0; N],
+    }
+}
+
 /// Terms of the final model as named causes, and as candidates with the reasons why they are not named; `contradicted` is whether predictions speak
-/// against them.
+/// against them, `unconfirmed` whether they do not speak for elastic joints and backlash where they have to.
 fn causes(
     found: &Found,
-    contradicted: bool,
+    [contradicted, unconfirmed]: [bool; 2],
     rotary: &[bool],
     commanded: Option<&PositionController>,
 ) -> (Vec<Cause>, Vec<Candidate>) {
-    let why_not =
-        |n: &search::Named| n.unfit(rotary).or_else(|| contradicted.then(|| PREDICTS_WORSE.to_owned()));
+    let why_not = |n: &search::Named| {
+        let against = if contradicted {
+            Some(PREDICTS_WORSE)
+        } else if unconfirmed && !n.term.own_motors().is_empty() {
+            Some(PREDICTS_NO_BETTER)
+        } else {
+            None
+        };
+        n.unfit(rotary).or_else(|| against.map(str::to_owned))
+    };
     let (mut named, mut candidates) = (Vec::new(), Vec::new());
     for n in &found.named {
         let cause = cause(n, rotary, commanded);
