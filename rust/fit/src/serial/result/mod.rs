@@ -90,23 +90,18 @@ pub(crate) fn assemble<const N: usize, const P: usize>(
     let unconfirmed = commanded.is_some()
         && !hidden.is_empty()
         && !is_improved(if others.is_empty() { &refit_missed } else { &missed_beside }, &missed(2), &floor);
-    if unconfirmed {
-        (models[2], predicted[2]) = if others.is_empty() {
-            (models[1].clone(), predicted[1].clone())
-        } else {
-            (beside, predicted_beside)
-        };
-    }
     let (named, candidates) = causes(found, [contradicted, unconfirmed], &rotary, commanded);
-    let reported = if contradicted { &found.refit_feasible } else { &found.reported };
-    if contradicted {
-        let (model, prediction) = (models[1].clone(), predicted[1].clone());
-        (models[2], predicted[2]) = (model, prediction);
+    let none_stays = contradicted || unconfirmed && others.is_empty();
+    let reported = if none_stays { &found.refit_feasible } else { &found.reported };
+    if none_stays {
+        (models[2], predicted[2]) = (models[1].clone(), predicted[1].clone());
+    } else if unconfirmed {
+        (models[2], predicted[2]) = (beside, predicted_beside);
     }
     let compared = Compared { models, predicted, measured, floor };
     let mut gap = gap(&compared, data, &rotary, options);
     let [_, refit, with_causes] = self::models(description, arm, training, found);
-    let on_training = if contradicted { refit } else { with_causes };
+    let on_training = if none_stays { refit } else { with_causes };
     gap.training = (named.is_empty() && !stands_out(&gap.after, &gap.floor, &gap.motion))
         .then(|| training_gap(&training.data, &on_training))
         .flatten();

@@ -303,9 +303,6 @@ impl<const N: usize, const P: usize> Equation<N, P> {
     /// link and the motor leads by the deflection; `deflections` holds deflection and rate by log and sample interval.
     fn of_motor(&self, j: usize, deflections: &[Vec<[f64; 2]>], theta: &[f64; P]) -> Signal {
         let (rotor, viscous) = (theta[10 * N + j], self.arm.viscous(theta)[j]);
-        if rotor == 0.0 && viscous == 0.0 {
-            return vec![None; N];
-        }
         let changes: Vec<Vec<[SVector<f64, N>; 2]>> = deflections
             .iter()
             .map(|log| {
@@ -333,4 +330,97 @@ pub struct Computed<const N: usize, const P: usize> {
     needs: Cache<[f64; P], LinkNeeds<N>>,
     /// Derivatives of the links' torques by the position and velocity of a joint.
     derivatives: Cache<(usize, [f64; P]), LinkDerivatives<N>>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::log::track::Track;
+    use crate::serial::weak_form::intervals::HALF_WIDTH_S;
+    use armgap_core::chain::{Chain, ChainJoint, JointKind};
+
+    const PERIOD: f64 = 0.002;
+    /// Inertia of the link, kg m^2.
+    const LINK: f64 = 0.7;
+    /// Inertia of the rotor, kg m^2.
+    const ROTOR: f64 = 0.3;
+    /// Viscous friction of the motor, N m s/rad.
+    const VISCOUS: f64 = 0.9;
+
+    /// Positions of motor and link, rad, and the motor's torques, N m, of two bodies about the vertical that `shaft` connects: the torque that it
+    /// passes on at a deflection and deflection rate. Small semi-implicit steps.
+    fn two_bodies(shaft: impl Fn(f64, f64) -> f64) -> [Vec<f64>; 3] {
+        let steps = 200;
+        let h = PERIOD / f64::from(steps);
+        let (mut at, mut rate) = ([0.0_f64; 2], [0.0_f64; 2]);
+        let [mut motor, mut link, mut torques] = [const { Vec::new() }; 3];
+        for k in 0..4000 {
+            let t = PERIOD * f64::from(k);
+            // From rest: a start that jumps would ring for seconds.
+            let torque = t.min(1.0) * (4.0 * (3.1 * t).cos() + 2.0 * (7.7 * t).cos());
+            motor.push(at[0]);
+            link.push(at[1]);
+            torques.push(torque);
+            for _ in 0..steps {
+                let passed = shaft(at[0] - at[1], rate[0] - rate[1]);
+                rate[0] += h * (torque - VISCOUS * rate[0] - passed) / ROTOR;
+                rate[1] += h * passed / LINK;
+                (0..2).for_each(|i| at[i] += h * rate[i]);
+            }
+        }
+        [motor, link, torques]
+    }
+
+    /// RMS torque that the rows leave unexplained at the true parameters, N m: without the transmission, and with it at its true values `p`.
+    fn left(law: TransmissionLaw, p: &[f64], [motor, link, torques]: &[Vec<f64>; 3]) -> [f64; 2] {
+        let identity = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let kind = JointKind::Revolute;
+        let joint = ChainJoint { kind, rotation: identity, translation: [0.0; 3], axis: [0.0, 0.0, 1.0] };
+        let mut theta = [0.0; 13];
+        (theta[0], theta[9], theta[10], theta[11]) = (1.0, LINK, ROTOR, VISCOUS);
+        let t: Vec<f64> = (0..motor.len()).map(|k| PERIOD * k as f64).collect();
+        let q = if law.encoder_at_motor { motor } else { link };
+        let track = Track::<1>::new("", &t, q, torques, Some([1e-9]));
+        let equation = Equation::<1, 13>::new(Chain::new([joint], [0.0; 3]), &theta, &[track], HALF_WIDTH_S);
+        let rms = |beside: &Signal| {
+            let residual = &equation.rows.residual(&theta, beside)[0];
+            assert!(residual.len() > 200);
+            (residual.iter().map(|r| r * r).sum::<f64>() / residual.len() as f64).sqrt()
+        };
+        [rms(&vec![None]), rms(&equation.of_transmission(&law, p, &theta))]
+    }
+
+    #[test]
+    fn rows_of_two_bodies_on_a_shaft_are_explained_at_the_true_values() {
+        let [stiffness, damping] = [90.0, 0.6];
+        let bodies = two_bodies(|deflection, rate| stiffness * deflection + damping * rate);
+        for encoder_at_motor in [true, false] {
+            let law = TransmissionLaw { joint: 0, encoder_at_motor, compliance: Compliance::Elastic };
+            let [rigid, elastic] = left(law, &[1.0 / stiffness, damping / stiffness], &bodies);
+            assert!(elastic < 0.05 * rigid, "{encoder_at_motor}: {rigid} {elastic}");
+        }
+    }
+
+    #[test]
+    fn rows_of_two_bodies_with_backlash_are_explained_best_at_the_true_gap() {
+        let gap = 0.05;
+        // Flanks that are stiff beside all else, and damped so that the bodies do not rebound.
+        let bodies = two_bodies(|deflection, rate| {
+            let depth = deflection.abs() - 0.5 * gap;
+            let push = 2e4 * depth + 250.0 * rate * deflection.signum();
+            if depth > 0.0 { push.max(0.0) * deflection.signum() } else { 0.0 }
+        });
+        for encoder_at_motor in [true, false] {
+            let law = TransmissionLaw { joint: 0, encoder_at_motor, compliance: Compliance::Backlash };
+            let [rigid, free] = left(law, &[gap], &bodies);
+            assert!(free < 0.5 * rigid, "{encoder_at_motor}: {rigid} {free}");
+            // Accelerations of local cubics smear the impacts: the best gap is within a quarter of the true one with the encoder at the motor, and a
+            // half with it at the link.
+            let others = if encoder_at_motor { [0.8, 1.25] } else { [0.67, 1.5] };
+            for other in others {
+                let [_, off] = left(law, &[other * gap], &bodies);
+                assert!(off > free, "{encoder_at_motor}: {other} of the gap leaves {off}, the gap {free}");
+            }
+        }
+    }
 }
