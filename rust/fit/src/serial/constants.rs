@@ -10,8 +10,8 @@ pub const SIGNIFICANT: f64 = 34.0;
 /// logs alone: three standard deviations.
 pub const NOTICED: f64 = 9.0;
 
-/// Decrease of the training cost (weighted squared residuals), per parameter of a term of the model, from which the term is accepted: twice the
-/// natural logarithm of the number of candidates, some 400. A table, whose classes are not chosen among candidates one by one, pays this once,
+/// Twice the logarithm of the likelihood ratio on the training logs, per parameter of a term of the model, from which the term is accepted: twice
+/// the natural logarithm of the number of candidates, some 400. A table, whose classes are not chosen among candidates one by one, pays this once,
 /// and two more per class.
 pub const PRICE: f64 = 12.0;
 
@@ -73,6 +73,9 @@ pub const ARM_WIDE: f64 = 0.5;
 
 /// Number of laws that are fitted to all joints at once in one step of the model search: those that explain most to first order.
 pub const ARM_WIDE_FINALISTS: usize = 2;
+
+/// Number of laws that are fitted to all joints at once as rivals of a cause on several joints: those that explain most to first order.
+pub const ARM_WIDE_RIVALS: usize = 4;
 
 /// Probability below which a cause is reported as a mere candidate and not named.
 pub const NAMED: f64 = 0.3;

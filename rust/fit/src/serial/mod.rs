@@ -190,6 +190,8 @@ impl Request<'_> {
         let mut diagnosis =
             result::assemble(self.arm, &arm, &training, &holdout, &found, self.options, &progress);
         diagnosis.notes.extend(result::regularised(&widths));
+        diagnosis.options.friction_smoothing = widths.iter().copied().fold(0.0, f64::max);
+        diagnosis.options.friction_widths = widths;
         diagnosis.seconds = started.elapsed().as_secs_f64();
         Ok(diagnosis)
     }

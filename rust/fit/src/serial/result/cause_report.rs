@@ -3,7 +3,7 @@
 use crate::result::report::{
     Bound, Cause, CauseValue, EquivalentSummary, Named, RuledOut, SeveralJoints, Status, Value, Values,
 };
-use crate::serial::constants::{CONSEQUENCE, NOTICED, SIGNIFICANT};
+use crate::serial::constants::{CONSEQUENCE, NOTICED};
 use crate::serial::controller::PositionController;
 use crate::serial::result::controller_report::behind_controller;
 use crate::serial::search::{Found, Tested};
@@ -168,7 +168,7 @@ fn status(found: &Found, unexplained: &[Option<f64>], tested: &Tested, rotary: &
     }
     let statistic = (size / sigma.max(f64::MIN_POSITIVE)).powi(2);
     let largest = size.abs() + NORMAL_95_ONE_SIDED * sigma;
-    if statistic > SIGNIFICANT - NOTICED && largest * tested.consequence > 10.0 * CONSEQUENCE {
+    if statistic > NOTICED && largest * tested.consequence > 10.0 * CONSEQUENCE {
         let why = "explains a part of what remains, and too little of it to be named".to_owned();
         return entry(Status::Undecided, None, Some(why));
     }

@@ -5,7 +5,7 @@
 //! joints, and on at least half of the moving joints. In addition, what it explains beyond the same law on a single joint, the one where the law
 //! explains most, has to be accepted by itself.
 
-use crate::serial::constants::{ARM_WIDE, ARM_WIDE_FINALISTS, CONSEQUENCE, NOTICED, PRICE};
+use crate::serial::constants::{ARM_WIDE, CONSEQUENCE, NOTICED, PRICE};
 use crate::serial::search::Search;
 use crate::serial::search::evidence::consequence;
 use crate::serial::search::fitting::Fitted;
@@ -16,13 +16,14 @@ use crate::serial::weak_form::rows::Regression;
 const FEWEST_JOINTS: usize = 3;
 
 impl Search<'_> {
-    /// Models with one more law on several joints at once, fitted and accepted; tried are the laws that lower the cost most in the first-order tests
-    /// `screened`.
+    /// Models with one more law on several joints at once, fitted and accepted; tried are the `most` laws that lower the cost most in the first-order
+    /// tests `screened`.
     pub(in crate::serial) fn on_several_joints(
         &self,
         regression: &Regression,
         model: &Fitted,
         screened: &[(Term, f64)],
+        most: usize,
     ) -> Vec<Fitted> {
         let mut laws: Vec<(Vec<Term>, f64)> = Vec::new();
         let names = screened.iter().filter(|(term, _)| term.is_of_a_joint()).map(|(term, _)| term);
@@ -38,7 +39,7 @@ impl Search<'_> {
         let degrees = |terms: &[Term]| terms.iter().map(|term| term.degrees).sum::<f64>();
         laws.retain(|(terms, gain)| terms.len() >= self.fewest() && *gain > PRICE + 2.0 * degrees(terms));
         laws.sort_by(|a, b| (b.1 - 2.0 * degrees(&b.0)).total_cmp(&(a.1 - 2.0 * degrees(&a.0))));
-        let finalists = laws.into_iter().take(ARM_WIDE_FINALISTS);
+        let finalists = laws.into_iter().take(most);
         finalists.filter_map(|(terms, _)| self.one_cause(regression, model, terms)).collect()
     }
 
@@ -109,7 +110,8 @@ impl Search<'_> {
             let signal = self.training.signal(member, &with.estimate.theta);
             let column = std::slice::from_ref(&signal);
             let statistic = regression.score(&with.estimate, column, &[0.0]).map_or(0.0, |score| {
-                1.0 / regression.sandwich(&with.estimate, column, &score)[(0, 0)].max(f64::MIN_POSITIVE)
+                1.0 / regression.sandwich(&with.estimate.residual, column, &score)[(0, 0)]
+                    .max(f64::MIN_POSITIVE)
             });
             let joint = member.joint().unwrap_or(1);
             statistic > NOTICED

@@ -1,13 +1,13 @@
 //! Results of a model search: probabilities of the found terms, their look-alikes, and tests of the terms that are not in the model.
 
-use crate::serial::constants::{ALIKE, ALIKE_COST, RIVAL_POWER};
-use crate::serial::search::evidence::{consequence, stability, trust};
+use crate::serial::constants::{ALIKE, ALIKE_COST, ARM_WIDE_RIVALS, RIVAL_POWER};
+use crate::serial::search::evidence::{consequence, floor, stability, trust};
 use crate::serial::search::fitting::Fitted;
 use crate::serial::search::screening::Guess;
 use crate::serial::search::tables::{beside_rival, left_by_rival};
 use crate::serial::search::{Found, Named, Search, Tested};
 use crate::serial::term::{Term, TermKind};
-use crate::serial::weak_form::rows::{JointRows, Regression};
+use crate::serial::weak_form::rows::Regression;
 use armgap_core::chain::LINK_PARAMETERS;
 use rayon::prelude::*;
 
@@ -78,8 +78,7 @@ impl Search<'_> {
 
     /// Holdout cost (weighted squared residuals) that the noise of positions alone gives, by joint.
     pub(in crate::serial) fn floor(&self, regression: &Regression) -> Vec<f64> {
-        let of = |(rows, w): (&JointRows, &f64)| w * rows.floor.iter().map(|f| f * f).sum::<f64>();
-        self.holdout.rows().joints.iter().zip(&regression.weights).map(of).collect()
+        floor(self.holdout.rows(), &regression.weights)
     }
 
     fn named(
@@ -96,7 +95,7 @@ impl Search<'_> {
         let screened = self.screened(guesses, regression, &without);
         let mut rivals = self.finalists(regression, &without, &screened);
         if term.is_on_several_joints() {
-            rivals.extend(self.on_several_joints(regression, &without, &screened));
+            rivals.extend(self.on_several_joints(regression, &without, &screened, ARM_WIDE_RIVALS));
         }
         let last = without.terms.len();
         rivals.retain(|r| !r.terms[last].same_place(&term));
@@ -118,7 +117,7 @@ impl Search<'_> {
             .map_or_else(
                 || vec![f64::INFINITY; term.p.len()],
                 |score| {
-                    let covariance = regression.sandwich(&model.estimate, &columns, &score);
+                    let covariance = regression.sandwich(&model.estimate.residual, &columns, &score);
                     // The scatter over blocks does not contain the uncertainty of the arm file's values; the inverse of the information with their
                     // prior does.
                     let variance = |i: usize| covariance[(i, i)].max(score.inverse()[(i, i)]).max(0.0);
@@ -146,7 +145,10 @@ impl Search<'_> {
             let column = std::slice::from_ref(&signal);
             let score = regression.score(&model.estimate, column, &[0.0]);
             let size = score.map_or([0.0, f64::INFINITY], |score| {
-                let sigma = regression.sandwich(&model.estimate, column, &score)[(0, 0)].max(0.0).sqrt();
+                let residual = regression.with_torques(&model.estimate, column, &score);
+                let variance =
+                    regression.sandwich(&residual, column, &score)[(0, 0)].max(score.inverse()[(0, 0)]);
+                let sigma = variance.max(0.0).sqrt();
                 [score.size[0], sigma]
             });
             let consequence = consequence(self.training.rows(), &signal);

@@ -10,15 +10,18 @@ use crate::serial::search::tables::table_price;
 use crate::serial::term::TermKind;
 use crate::serial::weak_form::rows::{JointRows, Regression, Rows, Signal};
 
+/// Share of a cost from which [`likelihood_gain`] is linear.
+const NEARLY_ALL: f64 = 0.95;
+
 /// Evidence for a term: comparison of the model with the term and the model without it.
 #[derive(Debug, Clone, Copy)]
 pub struct Evidence {
     /// Effective number of the term's parameters.
     pub parameters: f64,
-    /// Decrease of the training cost from which the term is accepted.
+    /// `gain` from which the term is accepted.
     pub price: f64,
-    /// Decrease, by the term, of the cost on the training logs: weighted squared residuals plus squared distance of the parameters from the arm
-    /// file's values, counted in standard deviations.
+    /// Twice the logarithm of the likelihood ratio of the models with and without the term on the training logs
+    /// ([`Search::likelihood_ratio`]), plus `relief`.
     pub gain: f64,
     /// Decrease, by the term, of the parameters' squared distance from the arm file's values, counted in standard deviations.
     pub relief: f64,
@@ -79,7 +82,7 @@ impl Search<'_> {
         let signal = self.training.signal(term, &with.estimate.theta);
         let column = std::slice::from_ref(&signal);
         let statistic = regression.score(&with.estimate, column, &[0.0]).map_or(0.0, |score| {
-            1.0 / regression.sandwich(&with.estimate, column, &score)[(0, 0)].max(f64::MIN_POSITIVE)
+            1.0 / regression.sandwich(&with.estimate.residual, column, &score)[(0, 0)].max(f64::MIN_POSITIVE)
         });
         let joints = self.rotary.len();
         let acts_on: Vec<usize> = (0..joints).filter(|j| signal[*j].is_some()).collect();
@@ -88,15 +91,16 @@ impl Search<'_> {
             .map(|j| (1.0 - cost(with, j) / cost(without, j)).max(0.0))
             .filter(|share| share.is_finite())
             .fold(0.0, f64::max);
+        let relief = without.estimate.prior_cost - with.estimate.prior_cost;
         let holdout_gain = acts_on.iter().map(|j| cost(without, *j) - cost(with, *j)).sum();
         Evidence {
             parameters: term.degrees,
             price: match term.kind {
-                TermKind::Table(ref table) => table_price(without.costs[0][table.joint].iter().sum(), term),
+                TermKind::Table(_) => table_price(term),
                 _ => PRICE * term.degrees,
             },
-            gain: without.estimate.cost - with.estimate.cost,
-            relief: without.estimate.prior_cost - with.estimate.prior_cost,
+            gain: relief + self.likelihood_ratio(regression, [without, with]),
+            relief,
             statistic,
             holdout_gain,
             deviations: confirmed(&acts_on, &regression.weights, self.holdout.rows(), [without, with]),
@@ -104,6 +108,38 @@ impl Search<'_> {
             consequence: consequence(self.training.rows(), &signal),
         }
     }
+}
+
+impl Search<'_> {
+    /// Twice the logarithm of the likelihood ratio of the models `with` and `without` a term on the training logs, where the variance of each joint's
+    /// residuals is estimated with either model, at least as that of the position noise: `n log(v0 / v1)` over the joints (Seber and Lee 2003, section
+    /// 4.2), with `n` the number of independent rows of the model without the term.
+    fn likelihood_ratio(&self, regression: &Regression, [without, with]: [&Fitted; 2]) -> f64 {
+        let rows = self.training.rows();
+        let floor = floor(rows, &regression.weights);
+        let cost = |set: &Fitted, j: usize| set.costs[0][j].iter().sum::<f64>().max(floor[j]);
+        let independent = rows.independent_rows(&without.estimate.residual);
+        let of = |(j, n): (usize, &f64)| n * (cost(without, j) / cost(with, j)).ln();
+        independent.iter().enumerate().map(of).filter(|x| x.is_finite()).sum()
+    }
+}
+
+/// Twice the logarithm of a likelihood ratio, by the decrease `gain` of a cost (weighted squared residuals) that is `before`, where the weights were
+/// made for residuals as large as before: `-before log(1 - gain / before)`, linear from [`NEARLY_ALL`] of the cost on, as first-order tests may
+/// promise more than there is.
+pub(in crate::serial) fn likelihood_gain(gain: f64, before: f64) -> f64 {
+    let most = NEARLY_ALL * before;
+    if gain <= 0.0 || most <= 0.0 {
+        gain
+    } else {
+        (gain - most).max(0.0) - before * (1.0 - gain.min(most) / before).ln()
+    }
+}
+
+/// Cost (weighted squared residuals) that the noise of positions alone gives, by joint.
+pub(in crate::serial) fn floor(rows: &Rows, weights: &[f64]) -> Vec<f64> {
+    let of = |(rows, w): (&JointRows, &f64)| w * rows.floor.iter().map(|f| f * f).sum::<f64>();
+    rows.joints.iter().zip(weights).map(of).collect()
 }
 
 /// Slope of a regression, over `joints`, of the holdout residuals without a term on the part of them that the term removes, divided by the slope's
@@ -211,8 +247,19 @@ mod tests {
             block: (0..ROWS).map(|k| k / 20).collect(),
             floor: vec![0.1; ROWS],
         };
-        let rows = Rows { joints: vec![joint], parameters: 0, blocks: ROWS / 20 };
+        let rows = Rows { joints: vec![joint], parameters: 0, blocks: ROWS / 20, independent: 10 };
         confirmed(&[0], &[1.0], &rows, [&without, &with])
+    }
+
+    #[test]
+    fn small_gains_count_as_they_are_and_large_ones_by_the_likelihood() {
+        assert!((likelihood_gain(1.0, 1e4) - 1.0).abs() < 1e-3);
+        assert!((likelihood_gain(9.0, 10.0) - 10.0 * 10.0_f64.ln()).abs() < 1e-12);
+        assert!(
+            likelihood_gain(12.0, 10.0) > likelihood_gain(9.6, 10.0)
+                && likelihood_gain(12.0, 10.0).is_finite()
+        );
+        assert_eq!((likelihood_gain(-3.0, 10.0), likelihood_gain(2.0, 0.0)), (-3.0, 2.0));
     }
 
     #[test]

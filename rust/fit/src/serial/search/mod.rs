@@ -11,6 +11,7 @@ pub(in crate::serial) mod tables;
 use crate::locate::dependence::Dependence;
 use crate::locate::table_form::TableForm;
 use crate::progress::{Phase, ProgressReporter};
+use crate::serial::constants::ARM_WIDE_FINALISTS;
 use crate::serial::search::evidence::Evidence;
 use crate::serial::search::fitting::Fitted;
 use crate::serial::search::screening::Guess;
@@ -131,7 +132,7 @@ impl Search<'_> {
         let last = model.terms.len();
         let accepted =
             single.into_iter().filter(|with| self.evidence(regression, model, with, last).is_accepted());
-        let on_several = self.on_several_joints(regression, model, &screened);
+        let on_several = self.on_several_joints(regression, model, &screened, ARM_WIDE_FINALISTS);
         let best = accepted.chain(on_several).min_by(|a, b| a.total().total_cmp(&b.total()))?;
         Some(best.terms[last].clone())
     }
@@ -234,7 +235,7 @@ mod tests {
                 JointRows { y, psi, block: (0..ROWS).map(|k| k / 30).collect(), floor: vec![SIGMA; ROWS] }
             };
             let joints = (0..2).map(|j| joint(j, &mut random)).collect();
-            Self { rows: Rows { joints, parameters: 2, blocks: ROWS / 30 } }
+            Self { rows: Rows { joints, parameters: 2, blocks: ROWS / 30, independent: 10 } }
         }
     }
 

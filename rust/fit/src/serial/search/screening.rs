@@ -3,6 +3,7 @@
 use crate::progress::Phase;
 use crate::serial::constants::{PRICE, TERM_FINALISTS};
 use crate::serial::search::Search;
+use crate::serial::search::evidence::likelihood_gain;
 use crate::serial::search::fitting::{Fitted, difference};
 use crate::serial::term::row_term::{RowLaw, RowTerm};
 use crate::serial::term::{Term, TermKind};
@@ -187,7 +188,8 @@ impl Search<'_> {
         self.training.signal(&term.with(p), theta)
     }
 
-    /// Candidates that are not in the model, each with the values and the decrease of the cost of its best first-order test, largest decrease first.
+    /// Candidates that are not in the model, each with the values of its best first-order test and twice the logarithm of the likelihood ratio that the
+    /// test promises ([`likelihood_gain`]), largest first.
     pub(in crate::serial) fn screened(
         &self,
         guesses: &[Vec<Guess>],
@@ -199,11 +201,19 @@ impl Search<'_> {
             .filter(|group| !model.terms.iter().any(|t| group.first().is_some_and(|g| g.term.same_place(t))))
             .collect();
         self.progress.begin(Phase::Screen, open.len());
+        let costs: Vec<f64> = model.costs[0].iter().map(|joint| joint.iter().sum()).collect();
+        let likelihood = |guess: &Guess, gain: f64| {
+            let acts_on = (0..costs.len()).filter(|j| guess.columns.iter().any(|c| c[*j].is_some()));
+            likelihood_gain(gain, acts_on.map(|j| costs[j]).sum())
+        };
         let mut found: Vec<(Term, f64)> = open
             .par_iter()
             .filter_map(|group| {
                 self.progress.unit();
-                let tests = group.iter().filter_map(|guess| self.test(regression, &model.estimate, guess));
+                let tests = group.iter().filter_map(|guess| {
+                    let (term, gain) = self.test(regression, &model.estimate, guess)?;
+                    Some((term, likelihood(guess, gain)))
+                });
                 tests.max_by(|a, b| a.1.total_cmp(&b.1))
             })
             .filter(|(_, gain)| gain.is_finite())

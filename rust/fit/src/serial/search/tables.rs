@@ -10,6 +10,7 @@ use crate::locate::variable_classes::CLASSES;
 use crate::result::verdict::ABOVE_NOISE;
 use crate::serial::constants::{MOST_TABLES, PRICE, RIVAL_FINALISTS};
 use crate::serial::search::Search;
+use crate::serial::search::evidence::likelihood_gain;
 use crate::serial::search::fitting::Fitted;
 use crate::serial::term::table::Table;
 use crate::serial::term::{Term, TermKind};
@@ -79,7 +80,7 @@ impl Search<'_> {
             score.gain
         };
         let before = regression.weights[joint] * at.residual[joint].iter().map(|r| r * r).sum::<f64>();
-        let excess = gain - table_price(before, &term);
+        let excess = likelihood_gain(gain, before) - table_price(&term);
         Some((term, excess))
     }
 
@@ -149,7 +150,7 @@ impl Search<'_> {
         let TermKind::Table(table) = &term.kind else { return None };
         let columns = self.training.columns_of_table(table);
         let score = regression.score(&with.estimate, &columns, &self.ridge_of(term, CLASSES, regression))?;
-        let covariance = regression.sandwich(&with.estimate, &columns, &score);
+        let covariance = regression.sandwich(&with.estimate.residual, &columns, &score);
         let held = |set: &Fitted| set.costs[1][table.joint].iter().sum::<f64>();
         let fell = held(without) - held(with);
         let present: Vec<usize> = (0..CLASSES).filter(|c| table.mean[*c].is_some()).collect();
@@ -179,12 +180,10 @@ impl Search<'_> {
     }
 }
 
-/// Decrease of the training cost from which a table is accepted, where its joint's cost (weighted squared residuals) is `before` without it.
-///
-/// With residuals judged at the variance that each model leaves, and weights made for residuals as large as without the table, a decrease `g` raises the log-likelihood by `-before ln(1 - g / before) / 2`, which has
-/// to pay for the table as for one term among some 400 candidates, and for its classes by Akaike's criterion.
-pub(in crate::serial) fn table_price(before: f64, term: &Term) -> f64 {
-    before * (1.0 - (-(PRICE + 2.0 * term.degrees) / before.max(f64::MIN_POSITIVE)).exp())
+/// Twice the logarithm of the likelihood ratio from which a table is accepted: as for one term among some 400 candidates, and for its classes by
+/// Akaike's criterion.
+pub(in crate::serial) fn table_price(term: &Term) -> f64 {
+    PRICE + 2.0 * term.degrees
 }
 
 /// Squared holdout residuals above those of the position noise (`floor`, by joint) that a model with a `rival` in a cause's place leaves, relative to
@@ -239,16 +238,5 @@ mod tests {
         assert!((beside_rival(0.8, 0.5, 4) - 0.2).abs() < 1e-12);
         assert_eq!(beside_rival(1.0, 0.5, 4), 1.0);
         assert_eq!(beside_rival(1.0, 0.0, 4), 0.0);
-    }
-
-    #[test]
-    fn a_table_pays_for_its_classes_in_log_likelihood() {
-        let along: Vec<[f64; 2]> = (0..160).map(|k| [1.0, f64::from(k)]).collect();
-        let form = TableForm { factor: Factor::One, variable: MotionVariable::Time };
-        let term = Table::new(0, form, &along).unwrap().term();
-        let (price, before) = (PRICE + 2.0 * term.degrees, 50.0);
-        let gain = table_price(before, &term);
-        assert!((-before * (1.0 - gain / before).ln() - price).abs() < 1e-9);
-        assert!((table_price(1e6, &term) / price - 1.0).abs() < 1e-3 && gain < before);
     }
 }

@@ -56,7 +56,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
             logs.iter().enumerate().flat_map(|(i, log)| log.test_functions(i, half_width)).collect();
         let mut equation = Self {
             arm,
-            rows: Rows { joints: Vec::new(), parameters: P, blocks: 0 },
+            rows: Rows { joints: Vec::new(), parameters: P, blocks: 0, independent: 1 },
             logs,
             times: tracks.iter().map(|t| t.t.clone()).collect(),
             held: tracks.iter().map(|t| t.held.clone()).collect(),
@@ -133,7 +133,8 @@ impl<const N: usize, const P: usize> Equation<N, P> {
             rows
         };
         let joints = (0..N).map(joint).collect();
-        Rows { joints, parameters: P, blocks: first_block[self.logs.len()] }
+        let independent = self.functions.iter().map(TestFunction::independent).max().unwrap_or(1);
+        Rows { joints, parameters: P, blocks: first_block[self.logs.len()], independent }
     }
 
     /// Regressors in the middle of a sample interval, by joint and parameter: of the momentum, and of the torque without the momentum's derivative.

@@ -23,6 +23,10 @@ const FEWEST_PERIODS: f64 = 5.0;
 /// Distance between neighbouring test functions, in half widths.
 const SPACING: f64 = 0.5;
 
+/// Time from which residual torques count as independent, s: disturbances are correlated over 0.05 to 0.3 s, and a longer correlation comes from
+/// torques that are missing in the model, or from test functions that overlap.
+const INDEPENDENT_S: f64 = 0.25;
+
 /// Speed, in standard deviations of the measured velocity, below which a joint counts as at rest: the measured torque then only bounds the dry
 /// friction.
 const AT_REST_DEVIATIONS: f64 = 3.0;
@@ -145,6 +149,11 @@ pub struct TestFunction {
 }
 
 impl TestFunction {
+    /// Lag, in test functions, from which residual torques count as independent.
+    pub fn independent(&self) -> usize {
+        (INDEPENDENT_S.max(2.0 * self.half) / (SPACING * self.half)).round() as usize
+    }
+
     /// Integral of the test function over the sample interval `m`, dimensionless; the sum over all intervals is 1.
     pub fn weight<const N: usize>(&self, m: &Middle<N>) -> f64 {
         let area = |t: f64| {

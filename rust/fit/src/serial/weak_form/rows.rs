@@ -2,10 +2,6 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-/// Largest lag, in rows, over which residuals count as correlated, a quarter of a second: disturbances are correlated over 0.05 to 0.3 s, and a
-/// longer correlation comes from torques that are missing in the model.
-const LONGEST_CORRELATION: usize = 10;
-
 /// Number of rounds in which parameters are estimated and the rows' weights computed from the residuals.
 const WEIGHT_ROUNDS: usize = 4;
 
@@ -31,6 +27,8 @@ pub struct Rows {
     pub parameters: usize,
     /// Number of blocks, stretches of one second, in all logs.
     pub blocks: usize,
+    /// Lag, in rows, from which residuals count as independent.
+    pub independent: usize,
 }
 
 /// Torque added to that of the arm's own parameters, by joint and row of the weak form, N m or N; `None` for joints that the torque does not act on.
@@ -84,6 +82,14 @@ impl JointRows {
     }
 }
 
+impl JointRows {
+    /// Mean square of the residuals `r`, at least that of the position noise, (N m)^2 or N^2.
+    fn variance(&self, r: &[f64]) -> f64 {
+        let mean = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>() / (x.len() as f64).max(1.0);
+        mean(r).max(mean(&self.floor))
+    }
+}
+
 impl Rows {
     /// Residuals by joint and row, N m or N: `y` less the torque of the parameters `theta` and a further torque (`beside`).
     pub fn residual(&self, theta: &[f64], beside: &Signal) -> Vec<Vec<f64>> {
@@ -94,13 +100,15 @@ impl Rows {
     /// number of correlated rows that count as one. A joint without rows has weight zero.
     pub fn weights(&self, residual: &[Vec<f64>]) -> Vec<f64> {
         let of = |(rows, r): (&JointRows, &Vec<f64>)| {
-            let n = r.len() as f64;
-            let variance = r.iter().map(|r| r * r).sum::<f64>() / n.max(1.0);
-            let noise = rows.floor.iter().map(|f| f * f).sum::<f64>() / n.max(1.0);
-            let weight = 1.0 / (variance.max(noise) * correlation_length(r));
+            let weight = 1.0 / (rows.variance(r) * correlation_length(r, self.independent));
             if weight.is_finite() { weight } else { 0.0 }
         };
         self.joints.iter().zip(residual).map(of).collect()
+    }
+
+    /// Number of independent rows of each joint: rows with the residuals `residual`, less those that others determine by correlation.
+    pub fn independent_rows(&self, residual: &[Vec<f64>]) -> Vec<f64> {
+        residual.iter().map(|r| r.len() as f64 / correlation_length(r, self.independent)).collect()
     }
 
     /// Sum of the weighted squared residuals by joint and block, a stretch of one second.
@@ -117,11 +125,11 @@ impl Rows {
 }
 
 /// Number of correlated rows that count as one independent row: one plus twice the sum of the residuals' autocorrelations up to the first that is not
-/// positive.
-fn correlation_length(r: &[f64]) -> f64 {
+/// positive, and below the lag `independent`, in rows.
+fn correlation_length(r: &[f64], independent: usize) -> f64 {
     let total: f64 = r.iter().map(|r| r * r).sum();
     let mut length = 1.0;
-    for lag in 1..LONGEST_CORRELATION.min(r.len()) {
+    for lag in 1..independent.min(r.len()) {
         let part: f64 = r.iter().zip(&r[lag..]).map(|(a, b)| a * b).sum();
         if part <= 0.0 || total <= 0.0 {
             break;
@@ -309,13 +317,30 @@ impl<'a> Regression<'a> {
         is_finite.then(|| Score { size: size.iter().copied().collect(), gain, information, inverse, solved })
     }
 
-    /// Covariance of the sizes of further torques, each of size 1 in `columns`, from the scatter of their scores over blocks, at an estimate that
-    /// includes the torques: robust to correlated residuals (sandwich estimator).
-    pub fn sandwich(&self, at: &Estimate, columns: &[Signal], score: &Score) -> DMatrix<f64> {
+    /// The estimate `at` with the torques `columns` added at the sizes of their first-order test `score`, and the parameters changed with them, to
+    /// first order: its residuals.
+    pub fn with_torques(&self, at: &Estimate, columns: &[Signal], score: &Score) -> Vec<Vec<f64>> {
+        let p = self.rows.parameters;
+        let mut residual = at.residual.clone();
+        for ((column, solved), size) in columns.iter().zip(&score.solved).zip(&score.size) {
+            for (j, rows) in self.rows.joints.iter().enumerate() {
+                for (row, r) in residual[j].iter_mut().enumerate() {
+                    let psi = &rows.psi[row * p..(row + 1) * p];
+                    let imitated: f64 = psi.iter().zip(solved.iter()).map(|(a, b)| a * b).sum();
+                    *r -= size * (column[j].as_ref().map_or(0.0, |c| c[row]) - imitated);
+                }
+            }
+        }
+        residual
+    }
+
+    /// Covariance of the sizes of further torques, each of size 1 in `columns`, from the scatter of their scores over blocks, with the residuals of a
+    /// model that includes the torques: robust to correlated residuals (sandwich estimator).
+    pub fn sandwich(&self, residual: &[Vec<f64>], columns: &[Signal], score: &Score) -> DMatrix<f64> {
         let (k, p) = (columns.len(), self.rows.parameters);
         let mut blocks = vec![DVector::<f64>::zeros(k); self.rows.blocks];
         for (j, rows) in self.rows.joints.iter().enumerate() {
-            for (row, r) in at.residual[j].iter().enumerate() {
+            for (row, r) in residual[j].iter().enumerate() {
                 let psi = &rows.psi[row * p..(row + 1) * p];
                 let weighted = self.weights[j] * r;
                 let total = &mut blocks[rows.block[row]];
@@ -395,7 +420,7 @@ mod tests {
             .collect();
         let block = (0..ROWS).map(|k| k / 20).collect();
         let joint = JointRows { y, psi, block, floor: vec![noise; ROWS] };
-        (Rows { joints: vec![joint], parameters: 2, blocks: ROWS / 20 }, vec![Some(extra)])
+        (Rows { joints: vec![joint], parameters: 2, blocks: ROWS / 20, independent: 10 }, vec![Some(extra)])
     }
 
     fn prior(theta: [f64; 2], sigma: [f64; 2]) -> Prior {
@@ -468,7 +493,7 @@ mod tests {
             let at = regression.estimate(&none);
             let column = std::slice::from_ref(&extra);
             let score = regression.score(&at, column, &[0.0]).unwrap();
-            let sigma = regression.sandwich(&at, column, &score)[(0, 0)].sqrt();
+            let sigma = regression.sandwich(&at.residual, column, &score)[(0, 0)].sqrt();
             outside += usize::from(score.size[0].abs() > 1.96 * sigma);
         }
         assert!((2..=24).contains(&outside), "{outside} of 200 outside 95 %");
@@ -486,12 +511,12 @@ mod tests {
                 memory
             })
             .collect();
-        assert!(correlation_length(&white) < 1.3);
+        assert!(correlation_length(&white, 10) < 1.3);
         // The correlation length of a first-order autoregressive process is (1 + a) / (1 - a).
         assert!(
-            (correlation_length(&coloured) / 9.0 - 1.0).abs() < 0.35,
+            (correlation_length(&coloured, 10) / 9.0 - 1.0).abs() < 0.35,
             "{}",
-            correlation_length(&coloured)
+            correlation_length(&coloured, 10)
         );
     }
 }
