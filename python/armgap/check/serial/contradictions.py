@@ -50,6 +50,8 @@ _UNDECIDED = 10.0
 # Difference of two readings' costs, as a part of their gain, below which the readings are alike.
 _ALIKE_COST_PART = 0.02
 
+# Factor on the standard deviations of the links' inertial parameters with which the search for the torques' factors starts: as trusted values.
+_TRUSTED = 0.01
 # Range of factors on a torque that are gains, not other units.
 _NO_UNIT = (0.5, 2.0)
 # Factors that are tried on a torque, with both signs: three decades either way; refined between neighbours.
@@ -204,26 +206,38 @@ def _offered(logs: Sequence[Log], arm: Arm) -> Iterator[Reading]:
 
 
 def _factors(logs: Sequence[Log], arm: Arm) -> tuple[Array, Fit] | None:
-    """Return the factor per torque for the best agreement of logs and arm file, by alternating grid searches, and its fit; None for short logs."""
+    """Return the factor per torque for the best agreement of logs and arm file, and its fit; None for short logs.
+
+    Alternating grid searches start from the factors that agree best with the arm file's links: from the torques as they stand, some that are all too
+    small would look like a light arm of which the others are right.
+    """
     rows = Rows.of(logs, arm)
     if rows is None:
         return None
-    factors = np.ones(arm.n_joints)
-    best = rows.fit(arm, factors)
-
-    def with_factor(j: int, factor: float) -> tuple[Array, Fit]:
-        tried = factors.copy()
-        tried[j] = factor
-        return tried, rows.fit(arm, tried)
-
-    for grid in (_COARSE, _COARSE, _FINE):
-        for j in range(arm.n_joints):
-            factors, best = min(
-                ((factors, best), *(with_factor(j, factor) for factor in factors[j] * grid)),
-                key=lambda found: found[1].cost,
-            )
+    links = slice(0, 10 * arm.n_joints)
+    sigma = arm.sigma.copy()
+    sigma[links] *= _TRUSTED
+    start, _ = _descended(rows, replace(arm, sigma=sigma), np.ones(arm.n_joints), (_COARSE, _FINE))
+    factors, best = _descended(rows, arm, start, (_COARSE, _FINE))
     for j in range(arm.n_joints):
-        plain = with_factor(j, float(np.sign(factors[j])))
+        plain = _with_factor(rows, arm, factors, j, float(np.sign(factors[j])))
         if plain[1].cost < best.cost + _UNDECIDED:
             factors, best = plain
     return factors, best
+
+
+def _descended(rows: Rows, arm: Arm, factors: Array, grids: Iterable[Array]) -> tuple[Array, Fit]:
+    """Return the factors of least cost by alternating grid searches from `factors`, and their fit."""
+    best = rows.fit(arm, factors)
+    for grid in grids:
+        for j in range(arm.n_joints):
+            tried = (_with_factor(rows, arm, factors, j, factor) for factor in factors[j] * grid)
+            factors, best = min(((factors, best), *tried), key=lambda found: found[1].cost)
+    return factors, best
+
+
+def _with_factor(rows: Rows, arm: Arm, factors: Array, j: int, factor: float) -> tuple[Array, Fit]:
+    """Return the factors with that of joint `j` (from 0) replaced, and their fit."""
+    tried = factors.copy()
+    tried[j] = factor
+    return tried, rows.fit(arm, tried)
