@@ -1,0 +1,105 @@
+"""Train on one half of a real log, score on the other, and the other way round: ``python -m tests.real_logs --help``."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+import click
+import numpy as np
+import polars as pl
+
+import armgap
+
+from .least_squares import Array, Columns, model_of, names_of, regression, share_left, solve
+
+
+@click.command(name="python -m tests.real_logs", context_settings={"max_content_width": 100, "show_default": True})
+@click.argument("log", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.option(
+    "--urdf", type=click.Path(exists=True, dir_okay=False, path_type=Path), required=True, help="Description."
+)
+@click.option("--arm", "arm_file", type=click.Path(exists=True, dir_okay=False, path_type=Path), required=True,
+              help="Arm file made of it.")  # fmt: skip
+@click.option(
+    "--cutoff",
+    type=click.FloatRange(min=0, min_open=True),
+    default=1.0,
+    help="Cut-off frequency of the score's filter [Hz].",
+)
+@click.option(
+    "--block",
+    type=click.FloatRange(min=0, min_open=True),
+    help="Length of the blocks that are learnt from and scored by turns [s]; halves by default.",
+)
+def main(log: Path, urdf: Path, arm_file: Path, cutoff: float, block: float | None) -> None:
+    """Compare the torque that a diagnosis of LOG leaves with that of inverse-dynamics least squares."""
+    arm = armgap.Arm.read(arm_file)
+    table = pl.read_parquet(log)
+    t = table[:, 0].to_numpy() - table[0, 0]
+    place = np.floor(t / (block or (t[-1] + 1e-9) / 2)).astype(int)
+    with tempfile.TemporaryDirectory() as folder:
+        parts: list[list[Path]] = [[], []]
+        for number in range(place.max() + 1):
+            file = Path(folder) / f"block-{number}.parquet"
+            table.filter(pl.Series(place == number)).write_parquet(file)
+            parts[number % 2].append(file)
+        for training, holdout in (parts, parts[::-1]):
+            click.echo(
+                f"trained on {', '.join(f.stem for f in training)}, scored on {', '.join(f.stem for f in holdout)}"
+            )
+            _compare(arm, urdf, training, holdout, cutoff)
+
+
+def _compare(arm: armgap.Arm, urdf: Path, training: list[Path], holdout: list[Path], cutoff: float) -> None:
+    assert arm.chain is not None
+    joints = list(arm.chain.joint_names)
+    answer = armgap.diagnose(training, arm, holdout=holdout).to_dict()
+    factors = np.ones(len(joints))
+    for check in answer["checks"]:
+        for remedy in check["remedies"] if check["severity"] == "repaired" else ():
+            if remedy.startswith("--factor tau"):
+                joint, factor = remedy.removeprefix("--factor tau").split("=")
+                factors[int(joint) - 1] = float(factor)
+    widths = np.array(answer["options"]["friction_widths"])
+    model = model_of(urdf, joints)
+
+    def rows(files: list[Path]) -> list[tuple[Array, Array]]:
+        logs = [_columns(pl.read_parquet(file), joints, factors) for file in files]
+        return [regression(model, part, cutoff=cutoff, widths=widths) for part in logs]
+
+    learnt, scored = rows(training), rows(holdout)
+    tau, regressor = (np.concatenate([part[k] for part in learnt]) for k in (0, 1))
+
+    def values(which: str, key: str = "value") -> Array:
+        return np.array([answer["parameters"][which][name][key] for name in names_of(len(joints))])
+
+    ours, free, prior = (
+        share_left(scored, theta)
+        for theta in (
+            values("refit"),
+            solve(tau, regressor),
+            solve(tau, regressor, values("nominal"), values("nominal", "sigma")),
+        )
+    )
+    for j, name in enumerate(joints):
+        click.echo(
+            f"  {name:24} {100 * ours[j]:5.1f} %; least squares {100 * free[j]:5.1f} % (ratio {ours[j] / free[j]:.2f}), "
+            f"with the arm file as prior {100 * prior[j]:5.1f} % ({ours[j] / prior[j]:.2f})"
+        )
+    for cause in answer["causes"]:
+        click.echo(f"  named: {cause['effect']} of joint {cause['joint']}, probability {cause['probability']:.2f}")
+    said = sorted({(check["check"], check["joint"]) for check in answer["checks"]}, key=str)
+    click.echo("  checks: " + ", ".join(f"{check} {joint}" for check, joint in said))
+    for note in answer["notes"]:
+        click.echo(f"  {note}")
+
+
+def _columns(table: pl.DataFrame, joints: list[str], factors: np.ndarray) -> Columns:
+    time = next(name for name in table.columns if name in ("t", "time", "timestamp"))
+    q, tau = (table.select([f"{joint}/{name}" for joint in joints]).to_numpy() for name in ("position", "effort"))
+    return Columns(table[time].to_numpy().astype(float), q.astype(float), tau * factors)
+
+
+if __name__ == "__main__":
+    main()
