@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -42,9 +42,11 @@ OFF = 0.8
 LEAST = 0.03
 #: Standard deviations of torque disturbances that the log does not show, as shares of the joint's RMS torque.
 NOISE = (0.0, 0.01, 0.02)
-#: Largest number of draws for a case, of which the first with a usable motion and a hidden effect of sufficient size is taken.
+#: Largest number of draws for a case, of which the first with a usable motion and a visible effect of sufficient size is taken.
 _DRAWS = 80
 _KINDS = {effect.name: effect for effect in OUTSIDE} | COMMANDED
+#: Effects of the arm, not of its position controller: those leave a trace in torques.
+_OF_ARM = {*EFFECTS.values(), *OUTSIDE}
 _LOGS = ("train-1", "train-2", "holdout-1")
 _DURATION_S = 12.0
 #: Numbers of the first case without an effect, with an effect that the library does not have, and with clutter.
@@ -65,8 +67,8 @@ class Case:
         Training logs and holdout logs.
     key : dict
         What is hidden: ``effect``, ``joint`` (from 1; None for the whole arm), ``values``, ``outside`` (whether armgap's library lacks the
-        effect), ``change`` (RMS change of the joint's torque by the effect, as a share of that torque), ``above_floor``, ``moved`` and
-        ``visible`` (see `visibility.Visibility`; neither in null cases nor for logs of references); and how the case was made.
+        effect), ``change`` (RMS change of the joint's torque by the effect, as a share of that torque), ``above_floor`` and ``moved`` (see
+        `visibility.Visibility`; of effects of the arm); and how the case was made.
     """
 
     arm: armgap.Arm
@@ -146,7 +148,7 @@ def make_case(
     Raises
     ------
     RuntimeError
-        If no draw has a usable motion and an effect of sufficient size.
+        If no draw has a usable motion and a visible effect of sufficient size.
     """
     name = effect or ("null" if NULLS <= number < OUTSIDES else effect_of(seed, number, commanded=commanded))
     kind = _KINDS.get(name, Null) if isinstance(name, str) else name
@@ -238,8 +240,11 @@ def _draw(
         "kinds": "".join(kind[0].upper() for kind in robot.kinds), "period": period, "noise": noise, "controller": controlled,
         "theta": truth.theta.tolist(),
     }  # fmt: skip
-    if plain and not commanded:
-        key |= visibility(robot, sigma_of(robot, trust), plain, runs).to_dict()
+    if plain and kind in _OF_ARM:
+        seen = visibility(robot, sigma_of(robot, trust), plain, runs)
+        if not seen.visible:
+            return None
+        key |= asdict(seen)
     return Case(arm, logs[:-1], logs[-1:], key)
 
 

@@ -30,7 +30,7 @@ _ON_ROW = {"cable_spring": "joint_spring", "coupled_transmission": "coupled_tran
 #: Entries of a case's key that are copied into the record of its answer.
 _TOLD = (
     "seed", "number", "draw", "effect", "joint", "values", "outside", "change", "family", "joints", "kinds", "period", "noise", "controller",
-    "above_floor", "moved", "visible", "beside",
+    "above_floor", "moved", "beside",
 )  # fmt: skip
 
 
@@ -117,8 +117,6 @@ def report(records: list[Record]) -> str:
     lines = [f"{len(answers)} answers, {len(failed)} failed", ""]
     lines += _table("effect", hidden, lambda r: r["effect"])
     lines += _table("joints", hidden, lambda r: r["joints"])
-    seen = [r for r in hidden if "visible" in r]
-    lines += _table("visible", seen, lambda r: "yes" if r["visible"] else "no") if seen else []
     for label, of in (("no effect", nulls), ("effects outside the library", outside)):
         if of:
             named = [r for r in of if r["causes"]]
@@ -194,7 +192,7 @@ def _line(r: Record) -> str:
         return f"{place(c)} {c['probability']:.2f}{f' ~{alike}' if alike else ''}"
 
     values = ", ".join(f"{k} {_short(v)}" for k, v in r["values"].items())
-    seen = f", {r['above_floor']:.1f} floors, {r['moved']:.1f} sigmas" if "visible" in r else ""
+    seen = f", {r['above_floor']:.1f} floors, {r['moved']:.1f} sigmas" if "moved" in r else ""
     made = f"{r['family']} {r['kinds']}, {1e3 * r['period']:g} ms, {r['controller']}, noise {100 * r['noise']:g} %"
     said = f"{r['verdict']} [{'; '.join(map(name, r['causes']))}] ({'; '.join(map(name, r['candidates']))})"
     others = "".join(f" + {e['effect']}:{e['joint']}" for e in r["beside"])

@@ -3,13 +3,13 @@
 Torques along the logged positions, with the same low-pass filter on both, are regressed on the arm's parameters, with the arm file's standard
 deviations as prior (Siciliano 2009, section 7.2: the Newton-Euler recursion is linear in the ten numbers of each link). The same is done for
 runs without the effect along the same references. The effect is visible if its RMS residual is a multiple of that without it, on training logs
-and holdout, or if the estimated parameters differ much from those without it.
+and holdout, or if the estimated parameters differ much from those without it. Of logs of references, whose torques a diagnosis does not see, the
+simulated torques count.
 """
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,10 +55,6 @@ class Visibility:
     def visible(self) -> bool:
         """Whether the effect is visible, so that a diagnosis can find it."""
         return self.above_floor >= MULTIPLE or self.moved >= SIGMAS
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the entries of a case's key about visibility."""
-        return {**asdict(self), "visible": self.visible}
 
 
 def visibility(robot: SerialRobot, sigma: Array, plain: list[Run], logs: list[Run]) -> Visibility:
