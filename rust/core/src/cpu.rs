@@ -9,9 +9,14 @@
 //! is a function call where the instruction is missing. Everything below [`Kernel::run`] has to be inlined: a function that stays outside is compiled
 //! for every processor.
 //!
+//! Lanes of doubles ([`crate::lanes`]) are worked on by named vector instructions (`cpu/vector.rs`): [`Cpu::each`].
+//!
 //! Without the feature `std` only the instructions of the builder's `target-cpu` are used, and there is no unsafe code.
 
+pub(crate) mod vector;
+
 use crate::real::Real;
+use vector::Operation;
 
 /// Kind of processor that code is compiled for, as a type parameter: vector width and fused multiply-add.
 pub trait Cpu: Copy {
@@ -20,6 +25,13 @@ pub trait Cpu: Copy {
 
     /// `a b + c`, rounded once where the processor has one instruction for it.
     fn fused<T: Real>(a: T, b: T, c: T) -> T;
+
+    /// The operation `O` on each of `W` numbers, by vector instructions where the processor has them for `W` numbers of type `T`.
+    #[doc(hidden)]
+    #[inline(always)]
+    fn each<O: Operation, T: Real, const W: usize>(a: [T; W], b: [T; W], c: [T; W]) -> [T; W] {
+        vector::one_by_one::<Self, O, T, W>(a, b, c)
+    }
 }
 
 /// Processor that offers no more than the instructions of the compilation target.
@@ -47,6 +59,14 @@ impl<const DOUBLES: usize> Cpu for Fused<DOUBLES> {
     #[inline(always)]
     fn fused<T: Real>(a: T, b: T, c: T) -> T {
         a.mul_add(b, c)
+    }
+
+    #[inline(always)]
+    #[allow(unsafe_code)]
+    fn each<O: Operation, T: Real, const W: usize>(a: [T; W], b: [T; W], c: [T; W]) -> [T; W] {
+        // SAFETY: code for this processor runs inside of `avx2` or `avx512` alone, which are entered where the processor has these instructions;
+        // eight doubles only in the latter.
+        unsafe { vector::side_by_side::<Self, O, T, W, DOUBLES>(a, b, c) }
     }
 }
 

@@ -1,9 +1,10 @@
 //! Several numbers side by side, which a processor's vector unit takes together.
 //!
-//! Lanes are arrays, worked on by plain loops, which compilers turn into vector instructions wherever a function is compiled for them (see
-//! [`crate::cpu`]). All functions are inlined: one that is not would be compiled for every processor.
+//! Lanes are arrays. Four or eight doubles are added or multiplied by one instruction where a function is compiled for it, others by plain loops,
+//! which compilers turn into vector instructions where they can (see [`crate::cpu`]). All functions are inlined: one that is not would be compiled
+//! for every processor.
 
-use crate::cpu::Cpu;
+use crate::cpu::{Cpu, vector, vector::Operation};
 use crate::number::Number;
 use crate::real::{Real, lit};
 use core::marker::PhantomData;
@@ -43,36 +44,36 @@ impl<T: Real, C, const W: usize> Lanes<T, C, W> {
     }
 }
 
+impl<T: Real, C: Cpu, const W: usize> Lanes<T, C, W> {
+    /// The operation `O` in every lane, on these lanes, `b` and `c`.
+    #[inline(always)]
+    fn by<O: Operation>(self, b: Self, c: Self) -> Self {
+        Self::new(C::each::<O, T, W>(self.0, b.0, c.0))
+    }
+}
+
 /// Implements binary operators on lanes, lane by lane.
 macro_rules! lane_by_lane {
-    ($($operation:ident $function:ident),*) => {
+    ($($operation:ident $function:ident $by:ident),*) => {
         $(impl<T: Real, C: Cpu, const W: usize> $operation for Lanes<T, C, W> {
             type Output = Self;
 
             #[inline(always)]
             fn $function(self, other: Self) -> Self {
-                let mut x = self.0;
-                for l in 0..W {
-                    x[l] = x[l].$function(other.0[l]);
-                }
-                Self::new(x)
+                self.by::<vector::$by>(other, other)
             }
         })*
     };
 }
 
-lane_by_lane!(Add add, Sub sub, Mul mul, Div div);
+lane_by_lane!(Add add Sum, Sub sub Difference, Mul mul Product, Div div Quotient);
 
 impl<T: Real, C: Cpu, const W: usize> Neg for Lanes<T, C, W> {
     type Output = Self;
 
     #[inline(always)]
     fn neg(self) -> Self {
-        let mut x = self.0;
-        for l in 0..W {
-            x[l] = -x[l];
-        }
-        Self::new(x)
+        self.by::<vector::Negative>(self, self)
     }
 }
 
@@ -87,50 +88,31 @@ impl<T: Real, C: Cpu, const W: usize> Number for Lanes<T, C, W> {
 
     #[inline(always)]
     fn fused(self, a: Self, b: Self) -> Self {
-        let mut x = self.0;
-        for l in 0..W {
-            x[l] = C::fused(x[l], a.0[l], b.0[l]);
-        }
-        Self::new(x)
+        self.by::<vector::Fused>(a, b)
     }
 
     #[inline(always)]
     fn sine_cosine(self) -> (Self, Self) {
         let (sine, cosine) = crate::trig::series_of(self);
-        let largest = lit(crate::trig::largest::<T>());
-        let mut within = self.0;
-        for l in 0..W {
-            within[l] = if within[l].abs() <= largest { T::one() } else { lit(f64::NAN) };
-        }
-        let within = Self::new(within);
+        let largest = Self::of(lit(crate::trig::largest::<T>()));
+        let excess = self.size().larger(largest) - largest;
+        let within = excess.where_zero(Self::of(T::one()), Self::of(lit(f64::NAN)));
         (sine * within, cosine * within)
     }
 
     #[inline(always)]
     fn size(self) -> Self {
-        let mut x = self.0;
-        for l in 0..W {
-            x[l] = x[l].abs();
-        }
-        Self::new(x)
+        self.by::<vector::Size>(self, self)
     }
 
     #[inline(always)]
     fn larger(self, other: Self) -> Self {
-        let mut x = self.0;
-        for l in 0..W {
-            x[l] = if x[l] > other.0[l] { x[l] } else { other.0[l] };
-        }
-        Self::new(x)
+        self.by::<vector::Larger>(other, other)
     }
 
     #[inline(always)]
     fn where_zero(self, zero: Self, other: Self) -> Self {
-        let mut x = self.0;
-        for l in 0..W {
-            x[l] = if x[l] == T::zero() { zero.0[l] } else { other.0[l] };
-        }
-        Self::new(x)
+        self.by::<vector::WhereZero>(zero, other)
     }
 
     #[inline(always)]

@@ -4,7 +4,8 @@
 //! Kelly (1997), *Experimental evaluation of identification schemes on a direct drive robot*, Robotica 15,
 //! 563-571. No standard library, no allocation, no panic; `f64` and `f32`.
 #![no_std]
-// With the standard library, one call needs unsafe code: the call into code compiled for the processor's own instructions (`cpu`).
+// With the standard library, the processor's own instructions need unsafe code (`cpu`): the call into code compiled for them, and vector instructions
+// by name.
 #![cfg_attr(not(feature = "std"), forbid(unsafe_code))]
 
 #[cfg(feature = "std")]
