@@ -3,9 +3,9 @@
 use super::Chain;
 use super::inertia::{LinkInertia, SpatialInertia};
 use super::kinematics::LinkPose;
-use super::vector::{Twist, Wrench, dot, negative, of, scaled_plus, turned, zero};
+use super::vector::{Twist, Wrench, cross, cross_plus, dot, negative, of, scaled, scaled_plus, turned, zero};
 use crate::arm::EquationTerms;
-use crate::linear::solve_positive_definite;
+use crate::linear::solve_in_place;
 use crate::number::Number;
 use crate::real::{Real, lit};
 
@@ -21,11 +21,13 @@ impl<T: Real, const N: usize> Chain<T, N> {
         q: &[V; N],
     ) -> InertiaMatrix<V, N> {
         let poses = self.poses(q);
-        let mut inertia = [SpatialInertia::zero(); N];
-        for j in 0..N {
-            inertia[j] = SpatialInertia::of(&links[j], &poses[j]);
+        let (mut matrix, mut outer) = ([[zero(); N]; N], SpatialInertia::zero());
+        for j in (0..N).rev() {
+            outer = outer.plus(&SpatialInertia::of(&links[j], &poses[j]));
+            add_column(&mut matrix, &poses, &outer, j);
         }
-        composite_inertia(&poses, &mut inertia, &[[zero(); N]; N])
+        mirror(&mut matrix);
+        matrix
     }
 
     /// Joint torques of a motion by inverse dynamics, `M ddq + C dq + g`, `(N,)`, N m (N), of a chain with the inertial parameters `links`.
@@ -38,22 +40,18 @@ impl<T: Real, const N: usize> Chain<T, N> {
         ddq: &[V; N],
     ) -> [V; N] {
         let poses = self.poses(q);
-        let motions = self.motions(&poses, dq, Some(ddq));
-        let mut forces = [Wrench::zero(); N];
-        for j in 0..N {
-            forces[j] = motions[j].force(&SpatialInertia::of(&links[j], &poses[j]));
-        }
-        joint_torques(&poses, &mut forces)
+        joint_torques(links, &poses, &self.motions(&poses, dq, Some(ddq)))
     }
 
     /// Bias `C dq + g`, `(N,)`, N m (N), of a chain with the inertial parameters `links`: joint torques of a motion without acceleration.
     #[inline(always)]
     pub fn bias<V: Number<Real = T>>(&self, links: &[LinkInertia<V>; N], q: &[V; N], dq: &[V; N]) -> [V; N] {
-        self.equation_terms_at(&self.poses(q), links, &[[zero(); N]; N], dq).bias
+        let poses = self.poses(q);
+        joint_torques(links, &poses, &self.motions(&poses, dq, None))
     }
 
     /// Joint accelerations, `(N,)`, rad/s^2 (m/s^2), under the joint torques `tau`, N m (N), without friction; `constant_inertia`, such as rotor
-    /// inertias, is added to `M(q)`, which is factored as `L D L'`.
+    /// inertias, is added to `M(q)`, which is factored as `U D U'`.
     #[inline(always)]
     pub fn forward_dynamics<V: Number<Real = T>>(
         &self,
@@ -61,13 +59,12 @@ impl<T: Real, const N: usize> Chain<T, N> {
         constant_inertia: &InertiaMatrix<V, N>,
         [q, dq, tau]: [&[V; N]; 3],
     ) -> [V; N] {
-        let EquationTerms { inertia, bias } =
-            self.equation_terms_at(&self.poses(q), links, constant_inertia, dq);
-        let mut right = *tau;
-        for j in 0..N {
-            right[j] = right[j] - bias[j];
-        }
-        solve_positive_definite(inertia, right)
+        let (mut inertia, mut right) = (*constant_inertia, *tau);
+        self.add_equation_terms(&self.poses(q), links, dq, &mut inertia, |j, bias| {
+            right[j] = right[j] - bias;
+        });
+        solve_in_place(&mut inertia, &mut right);
+        right
     }
 
     /// Kinetic energy of the links, J, without that of rotors.
@@ -112,14 +109,32 @@ impl<T: Real, const N: usize> Chain<T, N> {
         constant_inertia: &InertiaMatrix<V, N>,
         dq: &[V; N],
     ) -> EquationTerms<V, N> {
+        let (mut inertia, mut bias) = (*constant_inertia, [zero(); N]);
+        self.add_equation_terms(poses, links, dq, &mut inertia, |j, own| bias[j] = own);
+        mirror(&mut inertia);
+        EquationTerms { inertia, bias }
+    }
+
+    /// Adds the inertia matrix to the upper triangle of `inertia`, by the composite rigid body algorithm, and calls `put(j, bias)` for every joint
+    /// `j`, from the last to the first. Bodies are added up from the last link inwards, so that nothing but the links' motions is kept for later.
+    #[inline(always)]
+    fn add_equation_terms<V: Number<Real = T>>(
+        &self,
+        poses: &[LinkPose<V>; N],
+        links: &[LinkInertia<V>; N],
+        dq: &[V; N],
+        inertia: &mut InertiaMatrix<V, N>,
+        mut put: impl FnMut(usize, V),
+    ) {
         let motions = self.motions(poses, dq, None);
-        let (mut inertia, mut forces) = ([SpatialInertia::zero(); N], [Wrench::zero(); N]);
-        for j in 0..N {
-            inertia[j] = SpatialInertia::of(&links[j], &poses[j]);
-            forces[j] = motions[j].force(&inertia[j]);
+        let (mut outer, mut force) = (SpatialInertia::zero(), Wrench::zero());
+        for j in (0..N).rev() {
+            let own = SpatialInertia::of(&links[j], &poses[j]);
+            force = force.plus(&motions[j].force(&own));
+            put(j, poses[j].joint.dot(&force));
+            outer = outer.plus(&own);
+            add_column(inertia, poses, &outer, j);
         }
-        let bias = joint_torques(poses, &mut forces);
-        EquationTerms { inertia: composite_inertia(poses, &mut inertia, constant_inertia), bias }
     }
 
     /// Motion of the base: at rest, with the acceleration `-g`, so that the links' weights appear as inertia forces.
@@ -161,49 +176,56 @@ pub(super) struct LinkMotion<V> {
 }
 
 impl<V: Number> LinkMotion<V> {
-    /// Spatial force that a link with this spatial inertia needs for its motion and its weight.
+    /// Spatial force that a link with this spatial inertia needs for its motion and its weight. With `a` the acceleration of the link's point at the
+    /// base origin less gravity, `alpha` the angular acceleration and `w` the angular velocity it is the force `m a + alpha x h + w x (w x h)` and
+    /// the moment `h x a + I alpha + w x I w`, `m` mass, `h` first and `I` second moments: `I a + v x* I v` (Featherstone 2008, section 5.3) with
+    /// the terms of the linear velocity collected.
     #[inline(always)]
     pub(super) fn force(&self, inertia: &SpatialInertia<V>) -> Wrench<V> {
-        let rate = self.velocity.cross_force(&inertia.times(&self.velocity));
-        inertia.times(&self.acceleration).plus(&rate)
+        let (Twist { angular: w, linear: v }, Twist { angular: alpha, linear }) =
+            (&self.velocity, &self.acceleration);
+        let (a, h) = (cross_plus(w, v, linear), &inertia.first);
+        let own = cross_plus(w, &inertia.second_times(w), &inertia.second_times(alpha));
+        let outwards = cross_plus(w, &cross(w, h), &scaled(inertia.mass, &a));
+        Wrench { moment: cross_plus(h, &a, &own), force: cross_plus(alpha, h, &outwards) }
     }
 }
 
-/// Joint torques, N m (N), for the spatial forces on each link; on return `forces[j]` is the sum over link `j` and all outer links.
+/// Joint torques, N m (N), of links with the inertial parameters `links` that move by `motions`.
 #[inline(always)]
-pub(super) fn joint_torques<V: Number, const N: usize>(
+fn joint_torques<V: Number, const N: usize>(
+    links: &[LinkInertia<V>; N],
     poses: &[LinkPose<V>; N],
-    forces: &mut [Wrench<V>; N],
+    motions: &[LinkMotion<V>; N],
 ) -> [V; N] {
     let (mut torques, mut outer) = ([zero(); N], Wrench::zero());
     for j in (0..N).rev() {
-        outer = outer.plus(&forces[j]);
-        forces[j] = outer;
+        outer = outer.plus(&motions[j].force(&SpatialInertia::of(&links[j], &poses[j])));
         torques[j] = poses[j].joint.dot(&outer);
     }
     torques
 }
 
-/// Inertia matrix by the composite rigid body algorithm plus `constant_inertia`, from the spatial inertia of each link; on return `inertia[j]` is the
-/// sum over link `j` and all outer links.
+/// Adds column `j` of the inertia matrix, `i <= j`, to `matrix`; `outer` is the spatial inertia of link `j` and all outer links.
 #[inline(always)]
-pub(super) fn composite_inertia<V: Number, const N: usize>(
+fn add_column<V: Number, const N: usize>(
+    matrix: &mut InertiaMatrix<V, N>,
     poses: &[LinkPose<V>; N],
-    inertia: &mut [SpatialInertia<V>; N],
-    constant_inertia: &InertiaMatrix<V, N>,
-) -> InertiaMatrix<V, N> {
-    let (mut matrix, mut outer) = (*constant_inertia, SpatialInertia::zero());
-    for j in (0..N).rev() {
-        outer = outer.plus(&inertia[j]);
-        inertia[j] = outer;
-        let force = outer.times(&poses[j].joint);
-        for i in 0..=j {
-            let entry = poses[i].joint.dot(&force);
-            matrix[i][j] = matrix[i][j] + entry;
-            if i != j {
-                matrix[j][i] = matrix[j][i] + entry;
-            }
+    outer: &SpatialInertia<V>,
+    j: usize,
+) {
+    let force = outer.times(&poses[j].joint);
+    for i in (0..N).take(j + 1) {
+        matrix[i][j] = matrix[i][j] + poses[i].joint.dot(&force);
+    }
+}
+
+/// Copies the upper triangle of `matrix` to the lower one.
+#[inline(always)]
+fn mirror<V: Number, const N: usize>(matrix: &mut InertiaMatrix<V, N>) {
+    for j in 0..N {
+        for i in (0..N).take(j) {
+            matrix[j][i] = matrix[i][j];
         }
     }
-    matrix
 }

@@ -1,6 +1,6 @@
 //! Poses of the links, and motion subspaces of the joints, in the base frame.
 
-use super::vector::{Matrix3, Twist, Vector3, add, cross, of, product, scaled_plus, turned, zero};
+use super::vector::{Matrix3, Twist, Vector3, cross, of, product, scaled_plus, turned, turned_plus, zero};
 use super::{Chain, ChainJoint, JointKind};
 use crate::number::Number;
 use crate::real::{Real, lit};
@@ -87,7 +87,7 @@ impl<T: Real, const N: usize> Chain<T, N> {
         q: &[V; N],
     ) -> [LinkPose<V>; N] {
         let mut poses = [LinkPose::none(); N];
-        let mut parent: Option<LinkPose<V>> = None;
+        let mut parent: Option<(Matrix3<V>, Vector3<V>)> = None;
         for j in 0..N {
             let (joint, constants) = (&self.joints[j], &self.constants[j]);
             let mut local = [[zero(); 3]; 3];
@@ -101,10 +101,10 @@ impl<T: Real, const N: usize> Chain<T, N> {
                 }
             }
             let (mut rotation, mut position, mut axis) = (local, of(&joint.translation), of(&constants.axis));
-            if let Some(parent) = &parent {
-                rotation = product(&parent.rotation, &local);
-                position = add(&turned(&parent.rotation, &position), &parent.position);
-                axis = turned(&parent.rotation, &axis);
+            if let Some((turn, origin)) = &parent {
+                rotation = product(turn, &local);
+                position = turned_plus(turn, &position, origin);
+                axis = turned(turn, &axis);
             }
             let subspace = match joint.kind {
                 JointKind::Revolute => Twist { angular: axis, linear: cross(&position, &axis) },
@@ -114,7 +114,7 @@ impl<T: Real, const N: usize> Chain<T, N> {
                 }
             };
             poses[j] = LinkPose { rotation, position, joint: subspace };
-            parent = Some(poses[j]);
+            parent = Some((rotation, position));
         }
         poses
     }

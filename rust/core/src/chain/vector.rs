@@ -77,6 +77,13 @@ pub(super) fn turned<V: Number>(m: &Matrix3<V>, x: &Vector3<V>) -> Vector3<V> {
     [dot(&m[0], x), dot(&m[1], x), dot(&m[2], x)]
 }
 
+/// Vector `m x + b`.
+#[inline(always)]
+pub(super) fn turned_plus<V: Number>(m: &Matrix3<V>, x: &Vector3<V>, b: &Vector3<V>) -> Vector3<V> {
+    let row = |i: usize| m[i][0].fused(x[0], m[i][1].fused(x[1], m[i][2].fused(x[2], b[i])));
+    [row(0), row(1), row(2)]
+}
+
 /// Product `m' x` of the transposed matrix `m` and the vector `x`.
 #[inline(always)]
 pub(super) fn turned_back<V: Number>(m: &Matrix3<V>, x: &Vector3<V>) -> Vector3<V> {
