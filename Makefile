@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 RUST_SOURCES := $(shell find rust -name '*.rs' -o -name Cargo.toml 2>/dev/null) Cargo.toml Cargo.lock
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test check check-lints check-tests licences lint test-rust test-python reproduce bench bench-baselines bench-ferromotion bench-instructions header dist docs wheel wheel-check clean all tools lint-tools
+.PHONY: help setup demo test check check-lints check-tests licences lint test-rust test-python reproduce bench bench-baselines bench-dynamics bench-ferromotion bench-instructions header dist docs wheel wheel-check clean all tools lint-tools
 
 help: ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 16
@@ -80,6 +80,11 @@ bench-baselines: $(VENV)/.built ## the core beside plain C, numpy, padasip, filt
 	cargo run -q --release -p armgap-benches --bin online_chain
 	$(BIN)/python benches/baselines/compare.py
 	$(BIN)/python benches/baselines/fit.py
+
+bench-dynamics: $(VENV)/.tools ## dynamics of serial arms beside Pinocchio in C++ (CXX, Eigen's headers), for any processor and for this one
+	$(BIN)/python -m pip install -q --disable-pip-version-check "pin>=3.0"
+	cargo run -q --release -p armgap-benches --features pinocchio --bin chain
+	CARGO_TARGET_DIR=target/native RUSTFLAGS="-C target-cpu=native" cargo run -q --release -p armgap-benches --features pinocchio --bin chain
 
 bench-ferromotion: tools ## the core's rollout beside the crate ferromotion, which is downloaded and takes minutes to compile
 	CARGO_TARGET_DIR=target/ferromotion cargo run -q --release --manifest-path benches/ferromotion/Cargo.toml
