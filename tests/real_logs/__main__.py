@@ -13,6 +13,11 @@ import armgap
 
 from .least_squares import Array, Columns, model_of, names_of, regression, share_left, solve
 
+#: Column of the times [s].
+TIME = "t"
+#: Length of the shortest block that is used [s]; a second at either end is the filter's.
+SHORTEST_S = 3.0
+
 
 @click.command(name="python -m tests.real_logs", context_settings={"max_content_width": 100, "show_default": True})
 @click.argument("log", type=click.Path(exists=True, dir_okay=False, path_type=Path))
@@ -36,13 +41,17 @@ def main(log: Path, urdf: Path, arm_file: Path, cutoff: float, block: float | No
     """Compare the torque that a diagnosis of LOG leaves with that of inverse-dynamics least squares."""
     arm = armgap.Arm.read(arm_file)
     table = pl.read_parquet(log)
-    t = table[:, 0].to_numpy() - table[0, 0]
+    t = table[TIME].to_numpy() - table[TIME][0]
     place = np.floor(t / (block or (t[-1] + 1e-9) / 2)).astype(int)
     with tempfile.TemporaryDirectory() as folder:
         parts: list[list[Path]] = [[], []]
         for number in range(place.max() + 1):
+            part = table.filter(pl.Series(place == number))
+            if not len(part) or part[TIME][-1] - part[TIME][0] < SHORTEST_S:
+                click.echo(f"block {number} is too short and left out")
+                continue
             file = Path(folder) / f"block-{number}.parquet"
-            table.filter(pl.Series(place == number)).write_parquet(file)
+            part.write_parquet(file)
             parts[number % 2].append(file)
         for training, holdout in (parts, parts[::-1]):
             click.echo(
@@ -57,10 +66,12 @@ def _compare(arm: armgap.Arm, urdf: Path, training: list[Path], holdout: list[Pa
     answer = armgap.diagnose(training, arm, holdout=holdout).to_dict()
     factors = np.ones(len(joints))
     for check in answer["checks"]:
-        for remedy in check["remedies"] if check["severity"] == "repaired" else ():
-            if remedy.startswith("--factor tau"):
-                joint, factor = remedy.removeprefix("--factor tau").split("=")
-                factors[int(joint) - 1] = float(factor)
+        if check["severity"] != "repaired":
+            continue
+        if check["check"] != "torque_unit":
+            raise click.ClickException(f"{check['message']}: this script repeats factors of torques only")
+        joint, factor = check["remedies"][0].removeprefix("--factor tau").split("=")
+        factors[int(joint) - 1] = float(factor)
     widths = np.array(answer["options"]["friction_widths"])
     model = model_of(urdf, joints)
 
@@ -69,6 +80,7 @@ def _compare(arm: armgap.Arm, urdf: Path, training: list[Path], holdout: list[Pa
         return [regression(model, part, cutoff=cutoff, widths=widths) for part in logs]
 
     learnt, scored = rows(training), rows(holdout)
+    period = float(np.median(np.diff(pl.read_parquet(training[0])[TIME].to_numpy())))
     tau, regressor = (np.concatenate([part[k] for part in learnt]) for k in (0, 1))
 
     def values(which: str, key: str = "value") -> Array:
@@ -79,7 +91,7 @@ def _compare(arm: armgap.Arm, urdf: Path, training: list[Path], holdout: list[Pa
         for theta in (
             values("refit"),
             solve(tau, regressor),
-            solve(tau, regressor, values("nominal"), values("nominal", "sigma")),
+            solve(tau, regressor, values("nominal"), values("nominal", "sigma"), 2.0 * cutoff * period),
         )
     )
     for j, name in enumerate(joints):
@@ -96,9 +108,8 @@ def _compare(arm: armgap.Arm, urdf: Path, training: list[Path], holdout: list[Pa
 
 
 def _columns(table: pl.DataFrame, joints: list[str], factors: np.ndarray) -> Columns:
-    time = next(name for name in table.columns if name in ("t", "time", "timestamp"))
     q, tau = (table.select([f"{joint}/{name}" for joint in joints]).to_numpy() for name in ("position", "effort"))
-    return Columns(table[time].to_numpy().astype(float), q.astype(float), tau * factors)
+    return Columns(table[TIME].to_numpy().astype(float), q.astype(float), tau * factors)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """Inverse-dynamics least squares of a serial arm (Siciliano 2009, section 7.3), by Pinocchio's regressor and SciPy's filters.
 
 Nothing of armgap is used here: positions are smoothed and differentiated, torque and regressor pass the same zero-phase low-pass filter, and
-the parameters are the ordinary least squares solution of smallest norm.
+the parameters are the weighted least squares solution of smallest norm in scaled columns.
 """
 
 from __future__ import annotations
@@ -81,11 +81,14 @@ def regression(model: pinocchio.Model, log: Columns, *, cutoff: float, widths: A
     return smooth(tau)[edge:-edge], smooth(whole)[edge:-edge]
 
 
-def solve(tau: Array, regressor: Array, theta: Array | None = None, sigma: Array | None = None) -> Array:
+def solve(
+    tau: Array, regressor: Array, theta: Array | None = None, sigma: Array | None = None, independent: float = 1.0
+) -> Array:
     """Return the least squares parameters, shape (13 n,); every joint's rows are weighted by the RMS of what is left of its torque.
 
     With `theta` and `sigma`, shape (13 n,), the arm file's values and standard deviations are a prior, which keeps what the motion does not
-    excite near them. Without, the solution of smallest norm is not bound to what a body can have.
+    excite near them; `independent` is the share of rows that count as independent.
+    Without, the solution of smallest norm is not bound to what a body can have.
     """
     weight = 1.0 / np.sqrt(np.mean(tau**2, axis=0))
     start = np.zeros(regressor.shape[2]) if theta is None else theta
@@ -98,9 +101,9 @@ def solve(tau: Array, regressor: Array, theta: Array | None = None, sigma: Array
             found = start + np.linalg.lstsq(rows / scale, right, rcond=RANK)[0] / scale
         else:
             known = sigma > 0
-            normal = rows[:, known].T @ rows[:, known] + np.diag(sigma[known] ** -2)
+            normal = independent * rows[:, known].T @ rows[:, known] + np.diag(sigma[known] ** -2)
             found = start.copy()
-            found[known] += np.linalg.solve(normal, rows[:, known].T @ right)
+            found[known] += np.linalg.solve(normal, independent * rows[:, known].T @ right)
         weight = 1.0 / np.sqrt(np.mean((tau - regressor @ found) ** 2, axis=0))
     return found
 

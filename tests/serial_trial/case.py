@@ -45,7 +45,7 @@ NOISE = (0.0, 0.01, 0.02)
 #: Largest number of draws for a case, of which the first with a usable motion and a visible effect of sufficient size is taken.
 _DRAWS = 80
 _KINDS = {effect.name: effect for effect in OUTSIDE} | COMMANDED
-#: Effects of the arm, not of its position controller: those leave a trace in torques.
+#: Effects that have to be visible, those of the arm and not of its position controller; in clutter the main effect alone has no logs to tell.
 _OF_ARM = {*EFFECTS.values(), *OUTSIDE}
 _LOGS = ("train-1", "train-2", "holdout-1")
 _DURATION_S = 12.0
@@ -240,7 +240,7 @@ def _draw(
         "kinds": "".join(kind[0].upper() for kind in robot.kinds), "period": period, "noise": noise, "controller": controlled,
         "theta": truth.theta.tolist(),
     }  # fmt: skip
-    if plain and kind in _OF_ARM:
+    if plain and kind in _OF_ARM and not clutter:
         seen = visibility(robot, sigma_of(robot, trust), plain, runs)
         if not seen.visible:
             return None

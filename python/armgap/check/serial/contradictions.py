@@ -208,8 +208,8 @@ def _offered(logs: Sequence[Log], arm: Arm) -> Iterator[Reading]:
 def _factors(logs: Sequence[Log], arm: Arm) -> tuple[Array, Fit] | None:
     """Return the factor per torque for the best agreement of logs and arm file, and its fit; None for short logs.
 
-    Alternating grid searches start from the factors that agree best with the arm file's links: from the torques as they stand, some that are all too
-    small would look like a light arm of which the others are right.
+    Alternating grid searches start from the torques as they stand, and from the factors that agree best with the arm file's links: where most torques
+    are too small, the first start takes them for those of a light arm.
     """
     rows = Rows.of(logs, arm)
     if rows is None:
@@ -217,8 +217,12 @@ def _factors(logs: Sequence[Log], arm: Arm) -> tuple[Array, Fit] | None:
     links = slice(0, 10 * arm.n_joints)
     sigma = arm.sigma.copy()
     sigma[links] *= _TRUSTED
-    start, _ = _descended(rows, replace(arm, sigma=sigma), np.ones(arm.n_joints), (_COARSE, _FINE))
-    factors, best = _descended(rows, arm, start, (_COARSE, _FINE))
+    stands = np.ones(arm.n_joints)
+    start, _ = _descended(rows, replace(arm, sigma=sigma), stands, (_COARSE, _FINE))
+    factors, best = min(
+        (_descended(rows, arm, stands, (_COARSE, _COARSE, _FINE)), _descended(rows, arm, start, (_COARSE, _FINE))),
+        key=lambda found: found[1].cost,
+    )
     for j in range(arm.n_joints):
         plain = _with_factor(rows, arm, factors, j, float(np.sign(factors[j])))
         if plain[1].cost < best.cost + _UNDECIDED:

@@ -81,7 +81,9 @@ def _facts(data: Data) -> list[tuple[str, str]]:
         ("seed of the resampling", str(options.get("seed", ""))),
         (
             "friction",
-            "smoothed over " + ", ".join(map(figure, smoothing)) + " rad/s" if any(smoothing) else "dry",
+            "smoothed over " + ", ".join(map(figure, smoothing)) + " rad/s (m/s on linear joints)"
+            if any(smoothing)
+            else "dry",
         ),
         ("schema", str(data.get("schema", ""))),
         ("armgap", str(data.get("version", ""))),

@@ -7,7 +7,7 @@
 pub const SIGNIFICANT: f64 = 34.0;
 
 /// Squared test statistic (estimated size over its standard deviation, robust to correlated residuals) that a term of the model needs on the training
-/// logs alone: three standard deviations.
+/// logs alone: three standard deviations. A candidate with more is not called absent.
 pub const NOTICED: f64 = 9.0;
 
 /// Twice the logarithm of the likelihood ratio on the training logs, per parameter of a term of the model, from which the term is accepted: twice
@@ -33,6 +33,10 @@ pub const RESTORES: f64 = 14.0;
 /// Further decrease of the parameters' squared distance from the arm file's values, per parameter of a term that only brings the parameters back to
 /// these values, see [`RESTORES`].
 pub const RESTORES_EACH: f64 = 1.5;
+
+/// Smallest standard deviation of a spring's torque along the training logs, relative to the torque's RMS, at which the spring is accepted: below, its
+/// rest position lies far outside the motion, and any constant torque would do.
+pub const SPRING_VARIES: f64 = 0.1;
 
 /// Prior standard deviation of the inertial parameters of a link whose nominal values are tested as wrong, as a multiple of the arm file's standard
 /// deviation: wide, and yet narrow enough to hold the parameters that motion does not determine near the arm file's values.

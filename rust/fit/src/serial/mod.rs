@@ -188,10 +188,7 @@ impl Request<'_> {
         };
         let found = search.run(self.options.max_causes, self.options.seed);
         let mut diagnosis =
-            result::assemble(self.arm, &arm, &training, &holdout, &found, self.options, &progress);
-        diagnosis.notes.extend(result::regularised(&widths));
-        diagnosis.options.friction_smoothing = widths.iter().copied().fold(0.0, f64::max);
-        diagnosis.options.friction_widths = widths;
+            result::assemble(self.arm, &arm, &training, &holdout, &found, (self.options, &widths), &progress);
         diagnosis.seconds = started.elapsed().as_secs_f64();
         Ok(diagnosis)
     }

@@ -57,7 +57,7 @@ pub(crate) fn assemble<const N: usize, const P: usize>(
     training: &Set<N, P>,
     holdout: &Set<N, P>,
     found: &Found,
-    options: &Options,
+    (options, widths): (&Options, &[f64]),
     progress: &ProgressReporter,
 ) -> Diagnosis {
     progress.begin(Phase::Result, 6);
@@ -120,6 +120,7 @@ pub(crate) fn assemble<const N: usize, const P: usize>(
     let (free_run_series, free_run) = free_runs(&compared, data);
     gap.free_run = free_run;
     let mut notes = notes(found, training, holdout, &rotary);
+    notes.extend(regularised(widths));
     notes.extend((worse && !contradicted && !unconfirmed).then(|| HIDDEN_STATES.to_owned()));
     notes.extend(gap.training.as_ref().map(|errors| remark(errors, &rotary)));
     Diagnosis {
@@ -149,7 +150,7 @@ pub(crate) fn assemble<const N: usize, const P: usize>(
             position_sigma: noise.to_vec(),
             encoder_step: training.data.tracks.first().map_or_else(Vec::new, |t| t.step.to_vec()),
         },
-        options: options_summary::<N>(options),
+        options: options_summary(options, widths),
         version: env!("CARGO_PKG_VERSION"),
         seconds: 0.0,
         notes,
@@ -157,14 +158,14 @@ pub(crate) fn assemble<const N: usize, const P: usize>(
     }
 }
 
-/// Options of a diagnosis of `N` joints as results state them.
-fn options_summary<const N: usize>(options: &Options) -> OptionSummary {
+/// Options of a diagnosis as results state them; `widths` by joint of regularised Coulomb friction, rad/s or m/s.
+fn options_summary(options: &Options, widths: &[f64]) -> OptionSummary {
     OptionSummary {
         horizon_s: options.horizon,
         max_causes: options.max_causes,
         seed: options.seed,
-        friction_smoothing: 0.0,
-        friction_widths: vec![0.0; N],
+        friction_smoothing: widths.iter().copied().fold(0.0, f64::max),
+        friction_widths: widths.to_vec(),
     }
 }
 
@@ -414,7 +415,7 @@ fn logs<const N: usize>(data: &Dataset<N>) -> Vec<LogSummary> {
 }
 
 /// Remark on joints whose Coulomb friction is regularised, `None` if there are none; `widths` by joint, rad/s or m/s, zero for dry friction.
-pub(crate) fn regularised(widths: &[f64]) -> Option<String> {
+fn regularised(widths: &[f64]) -> Option<String> {
     let wide: Vec<String> = widths
         .iter()
         .enumerate()

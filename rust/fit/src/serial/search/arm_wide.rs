@@ -16,7 +16,7 @@ use crate::serial::weak_form::rows::Regression;
 const FEWEST_JOINTS: usize = 3;
 
 impl Search<'_> {
-    /// Models with one more law on several joints at once, fitted and accepted; tried are the `most` laws that lower the cost most in the first-order
+    /// Models with one more law on several joints at once, fitted and accepted; tried are the `most` laws that promise most in the first-order
     /// tests `screened`.
     pub(in crate::serial) fn on_several_joints(
         &self,

@@ -23,10 +23,7 @@ impl Search<'_> {
     ) -> Found {
         let mut named: Vec<Named> =
             (0..model.terms.len()).map(|i| self.named(guesses, regression, &model, i, seed)).collect();
-        named.sort_by(|a, b| {
-            (b.evidence.gain + b.evidence.holdout_gain)
-                .total_cmp(&(a.evidence.gain + a.evidence.holdout_gain))
-        });
+        named.sort_by(|a, b| b.explained.total_cmp(&a.explained));
         let tested = self.tested(guesses, regression, &model);
         // Costs of the re-estimated and of the final model are comparable only under the same weights of the rows.
         let refit = if model.terms.is_empty() {
@@ -134,7 +131,8 @@ impl Search<'_> {
         let rival = self.rival_table(regression, &without, &acts_on);
         let left = rival.map_or(1.0, |rival| left_by_rival(model, &rival, &self.floor(regression), &acts_on));
         let probability = wins * beside_rival(trust, left, RIVAL_POWER);
-        Named { term, sigma, evidence, probability, alike }
+        let explained = without.estimate.cost - model.estimate.cost + evidence.holdout_gain;
+        Named { term, sigma, evidence, explained, probability, alike }
     }
 
     /// First-order tests, in addition to the terms of the model, of every candidate whose joint and effect are not in the model.

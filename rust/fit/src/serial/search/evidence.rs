@@ -2,15 +2,16 @@
 
 use crate::numeric::random::Random;
 use crate::serial::constants::{
-    CONSEQUENCE, HOLDOUT_DEVIATIONS, MATTERS, NOTICED, PRICE, RESAMPLES, RESTORES, RESTORES_EACH, SIGNIFICANT,
+    CONSEQUENCE, HOLDOUT_DEVIATIONS, MATTERS, NOTICED, PRICE, RESAMPLES, RESTORES, RESTORES_EACH,
+    SIGNIFICANT, SPRING_VARIES,
 };
 use crate::serial::search::Search;
 use crate::serial::search::fitting::Fitted;
 use crate::serial::search::tables::table_price;
 use crate::serial::term::TermKind;
-use crate::serial::weak_form::rows::{JointRows, Regression, Rows, Signal};
+use crate::serial::weak_form::rows::{Estimate, JointRows, Regression, Rows, Signal};
 
-/// Share of a cost from which [`likelihood_gain`] is linear.
+/// Share of a cost from which [`JointCosts::likelihood`] is linear.
 const NEARLY_ALL: f64 = 0.95;
 
 /// Evidence for a term: comparison of the model with the term and the model without it.
@@ -36,6 +37,8 @@ pub struct Evidence {
     pub share: f64,
     /// RMS torque of the term relative to the RMS torque of the joint, for the joint with the largest ratio.
     pub consequence: f64,
+    /// Whether the term is a spring whose torque hardly varies ([`SPRING_VARIES`]), which nothing tells from a constant torque.
+    pub is_preload: bool,
 }
 
 impl Evidence {
@@ -60,7 +63,7 @@ impl Evidence {
 
     /// Whether the term is accepted, for what it explains or for the arm file's values that it restores.
     pub fn is_accepted(&self) -> bool {
-        self.explains() || self.restores()
+        !self.is_preload && (self.explains() || self.restores())
     }
 }
 
@@ -106,33 +109,57 @@ impl Search<'_> {
             deviations: confirmed(&acts_on, &regression.weights, self.holdout.rows(), [without, with]),
             share,
             consequence: consequence(self.training.rows(), &signal),
+            is_preload: term.is_spring() && !varies(&signal),
         }
     }
-}
 
-impl Search<'_> {
     /// Twice the logarithm of the likelihood ratio of the models `with` and `without` a term on the training logs, where the variance of each joint's
     /// residuals is estimated with either model, at least as that of the position noise: `n log(v0 / v1)` over the joints (Seber and Lee 2003, section
     /// 4.2), with `n` the number of independent rows of the model without the term.
     fn likelihood_ratio(&self, regression: &Regression, [without, with]: [&Fitted; 2]) -> f64 {
         let rows = self.training.rows();
         let floor = floor(rows, &regression.weights);
-        let cost = |set: &Fitted, j: usize| set.costs[0][j].iter().sum::<f64>().max(floor[j]);
+        let cost =
+            |set: &Fitted, j: usize| set.costs[0][j].iter().sum::<f64>().max(floor[j]).max(f64::MIN_POSITIVE);
         let independent = rows.independent_rows(&without.estimate.residual);
         let of = |(j, n): (usize, &f64)| n * (cost(without, j) / cost(with, j)).ln();
-        independent.iter().enumerate().map(of).filter(|x| x.is_finite()).sum()
+        independent.iter().enumerate().map(of).filter(|x| !x.is_nan()).sum()
     }
 }
 
-/// Twice the logarithm of a likelihood ratio, by the decrease `gain` of a cost (weighted squared residuals) that is `before`, where the weights were
-/// made for residuals as large as before: `-before log(1 - gain / before)`, linear from [`NEARLY_ALL`] of the cost on, as first-order tests may
-/// promise more than there is.
-pub(in crate::serial) fn likelihood_gain(gain: f64, before: f64) -> f64 {
-    let most = NEARLY_ALL * before;
-    if gain <= 0.0 || most <= 0.0 {
-        gain
-    } else {
-        (gain - most).max(0.0) - before * (1.0 - gain.min(most) / before).ln()
+/// Costs (weighted squared residuals) of the joints on the training logs under a model, at least those of the position noise, and numbers of
+/// independent rows.
+pub(in crate::serial) struct JointCosts {
+    before: Vec<f64>,
+    independent: Vec<f64>,
+}
+
+impl JointCosts {
+    /// Costs under the model `at` along the logs of `rows`.
+    pub(in crate::serial) fn of(regression: &Regression, rows: &Rows, at: &Estimate) -> Self {
+        let floor = floor(rows, &regression.weights);
+        let cost = |(j, r): (usize, &Vec<f64>)| {
+            (regression.weights[j] * r.iter().map(|r| r * r).sum::<f64>()).max(floor[j])
+        };
+        let before = at.residual.iter().enumerate().map(cost).collect();
+        Self { before, independent: rows.independent_rows(&at.residual) }
+    }
+
+    /// Twice the logarithm of the likelihood ratio that a decrease `gain` of the cost of the `joints` (from 0), taken together, promises:
+    /// `-n log(1 - gain / before)`, linear from [`NEARLY_ALL`] of the cost on, as first-order tests may promise more than there is.
+    pub(in crate::serial) fn likelihood(&self, gain: f64, joints: impl Iterator<Item = usize>) -> f64 {
+        let (before, n) = joints
+            .map(|j| (self.before[j], self.independent[j]))
+            .fold((0.0, 0.0), |(cost, rows), (own, more)| (cost + own, rows + more));
+        let share = gain / before;
+        if !share.is_finite() {
+            return gain;
+        }
+        n * if share <= 0.0 {
+            share
+        } else {
+            (share - NEARLY_ALL).max(0.0) - (1.0 - share.min(NEARLY_ALL)).ln()
+        }
     }
 }
 
@@ -173,6 +200,15 @@ pub(in crate::serial) fn consequence(rows: &Rows, signal: &Signal) -> f64 {
         _ => 0.0,
     };
     rows.joints.iter().zip(signal).map(of).fold(0.0, f64::max)
+}
+
+/// Whether the torque of `signal` varies along the logs on some joint, by more than [`SPRING_VARIES`] of its RMS.
+fn varies(signal: &Signal) -> bool {
+    signal.iter().flatten().any(|torque| {
+        let mean = |of: &dyn Fn(f64) -> f64| torque.iter().map(|x| of(*x)).sum::<f64>() / torque.len() as f64;
+        let square = mean(&|x| x * x);
+        square - mean(&|x| x).powi(2) > SPRING_VARIES * SPRING_VARIES * square
+    })
 }
 
 /// Share of resamples of the blocks of training logs and holdout in which the cost of a model, plus two per effective parameter, is below that of
@@ -225,7 +261,6 @@ pub(in crate::serial) fn trust(without: &Fitted, with: &Fitted, evidence: &Evide
 mod tests {
     use super::*;
     use crate::numeric::random::Random;
-    use crate::serial::weak_form::rows::Estimate;
 
     const ROWS: usize = 240;
 
@@ -252,14 +287,24 @@ mod tests {
     }
 
     #[test]
+    fn a_spring_far_outside_the_motion_is_a_constant_torque() {
+        let torque = |rest: f64| vec![None, Some((0..ROWS).map(|k| (0.1 * k as f64).sin() - rest).collect())];
+        assert!(varies(&torque(3.0)));
+        assert!(!varies(&torque(20.0)));
+    }
+
+    #[test]
     fn small_gains_count_as_they_are_and_large_ones_by_the_likelihood() {
-        assert!((likelihood_gain(1.0, 1e4) - 1.0).abs() < 1e-3);
-        assert!((likelihood_gain(9.0, 10.0) - 10.0 * 10.0_f64.ln()).abs() < 1e-12);
-        assert!(
-            likelihood_gain(12.0, 10.0) > likelihood_gain(9.6, 10.0)
-                && likelihood_gain(12.0, 10.0).is_finite()
-        );
-        assert_eq!((likelihood_gain(-3.0, 10.0), likelihood_gain(2.0, 0.0)), (-3.0, 2.0));
+        let of = |gain: f64, before: f64, n: f64| {
+            JointCosts { before: vec![1.0, before], independent: vec![1.0, n] }
+                .likelihood(gain, std::iter::once(1))
+        };
+        assert!((of(1.0, 1e4, 1e4) - 1.0).abs() < 1e-3);
+        assert!((of(9.0, 10.0, 10.0) - 10.0 * 10.0_f64.ln()).abs() < 1e-12);
+        // Weights made for the residuals of a better model make the cost, and not the number of rows, larger.
+        assert!((of(60.0, 2000.0, 100.0) + 100.0 * 0.97_f64.ln()).abs() < 1e-9);
+        assert!(of(12.0, 10.0, 10.0) > of(9.6, 10.0, 10.0) && of(12.0, 10.0, 10.0).is_finite());
+        assert_eq!((of(-3.0, 10.0, 10.0), of(2.0, 0.0, 0.0)), (-3.0, 2.0));
     }
 
     #[test]

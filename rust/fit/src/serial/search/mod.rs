@@ -64,6 +64,8 @@ pub struct Named {
     pub sigma: Vec<f64>,
     /// Evidence for the term: comparison of the models with and without it.
     pub evidence: Evidence,
+    /// Decrease of the cost (weighted squared residuals and squared distance from the prior) by the term, on training logs and holdout.
+    pub explained: f64,
     /// Probability that the term, or one of its look-alikes, is in the arm.
     pub probability: f64,
     /// Look-alikes of the term: terms that explain the logs about as well in its stead.
@@ -453,6 +455,7 @@ mod tests {
             deviations: 5.0,
             share: 0.5,
             consequence: 0.1,
+            is_preload: false,
         };
         assert!(good.is_accepted());
         for weak in [
@@ -462,6 +465,7 @@ mod tests {
             Evidence { deviations: 1.0, ..good },
             Evidence { share: 0.05, ..good },
             Evidence { consequence: 1e-3, ..good },
+            Evidence { is_preload: true, ..good },
         ] {
             assert!(!weak.is_accepted(), "{weak:?}");
         }

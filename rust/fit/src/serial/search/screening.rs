@@ -3,7 +3,7 @@
 use crate::progress::Phase;
 use crate::serial::constants::{PRICE, TERM_FINALISTS};
 use crate::serial::search::Search;
-use crate::serial::search::evidence::likelihood_gain;
+use crate::serial::search::evidence::JointCosts;
 use crate::serial::search::fitting::{Fitted, difference};
 use crate::serial::term::row_term::{RowLaw, RowTerm};
 use crate::serial::term::{Term, TermKind};
@@ -189,7 +189,7 @@ impl Search<'_> {
     }
 
     /// Candidates that are not in the model, each with the values of its best first-order test and twice the logarithm of the likelihood ratio that the
-    /// test promises ([`likelihood_gain`]), largest first.
+    /// test promises ([`JointCosts::likelihood`]), largest first.
     pub(in crate::serial) fn screened(
         &self,
         guesses: &[Vec<Guess>],
@@ -201,10 +201,10 @@ impl Search<'_> {
             .filter(|group| !model.terms.iter().any(|t| group.first().is_some_and(|g| g.term.same_place(t))))
             .collect();
         self.progress.begin(Phase::Screen, open.len());
-        let costs: Vec<f64> = model.costs[0].iter().map(|joint| joint.iter().sum()).collect();
+        let costs = JointCosts::of(regression, self.training.rows(), &model.estimate);
         let likelihood = |guess: &Guess, gain: f64| {
-            let acts_on = (0..costs.len()).filter(|j| guess.columns.iter().any(|c| c[*j].is_some()));
-            likelihood_gain(gain, acts_on.map(|j| costs[j]).sum())
+            let joints = 0..self.rotary.len();
+            costs.likelihood(gain, joints.filter(|j| guess.columns.iter().any(|c| c[*j].is_some())))
         };
         let mut found: Vec<(Term, f64)> = open
             .par_iter()
@@ -222,7 +222,7 @@ impl Search<'_> {
         found
     }
 
-    /// Models with one more term each, fitted: one for each of the candidates that lower the cost most in the first-order tests `screened`.
+    /// Models with one more term each, fitted: one for each of the candidates that promise most in the first-order tests `screened`.
     pub(in crate::serial) fn finalists(
         &self,
         regression: &Regression,

@@ -23,8 +23,8 @@ const FEWEST_PERIODS: f64 = 5.0;
 /// Distance between neighbouring test functions, in half widths.
 const SPACING: f64 = 0.5;
 
-/// Time from which residual torques count as independent, s: disturbances are correlated over 0.05 to 0.3 s, and a longer correlation comes from
-/// torques that are missing in the model, or from test functions that overlap.
+/// Time from which residual torques count as independent, s, or twice the half width of the test functions if that is longer, as these overlap:
+/// disturbances are correlated over 0.05 to 0.3 s, and a longer correlation comes from torques that are missing in the model.
 const INDEPENDENT_S: f64 = 0.25;
 
 /// Speed, in standard deviations of the measured velocity, below which a joint counts as at rest: the measured torque then only bounds the dry
@@ -208,6 +208,12 @@ mod tests {
         let t: Vec<f64> = (0..count).map(|k| h * k as f64 + 1e-4 * (k as f64).sin()).collect();
         let q: Vec<f64> = t.iter().map(|t| 0.5 * 3.0 * t * t).collect();
         Track::new("", &t, &q, &vec![1.0; count], Some([1e-9]))
+    }
+
+    #[test]
+    fn residuals_are_independent_after_a_quarter_of_a_second_or_where_test_functions_end() {
+        let lag = |half| TestFunction { log: 0, first: 0, last: 1, centre: 0.0, half }.independent();
+        assert_eq!((lag(0.05), lag(0.4)), (10, 4));
     }
 
     #[test]

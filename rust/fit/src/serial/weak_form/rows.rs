@@ -71,6 +71,12 @@ pub fn sum(rows: &Rows, signals: &[Signal]) -> Signal {
 }
 
 impl JointRows {
+    /// Mean square of the residuals `r`, at least that of the position noise, (N m)^2 or N^2.
+    fn variance(&self, r: &[f64]) -> f64 {
+        let mean = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>() / (x.len() as f64).max(1.0);
+        mean(r).max(mean(&self.floor))
+    }
+
     /// Residuals of one joint's rows, N m or N: `y` less the torque of the parameters `theta` and a further torque (`beside`).
     fn residual(&self, theta: &[f64], beside: Option<&Vec<f64>>) -> Vec<f64> {
         let p = theta.len();
@@ -79,14 +85,6 @@ impl JointRows {
             self.y[i] - own - beside.map_or(0.0, |s| s[i])
         };
         (0..self.y.len()).map(row).collect()
-    }
-}
-
-impl JointRows {
-    /// Mean square of the residuals `r`, at least that of the position noise, (N m)^2 or N^2.
-    fn variance(&self, r: &[f64]) -> f64 {
-        let mean = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>() / (x.len() as f64).max(1.0);
-        mean(r).max(mean(&self.floor))
     }
 }
 
@@ -438,6 +436,23 @@ mod tests {
             "{:?}",
             found.theta
         );
+    }
+
+    #[test]
+    fn residuals_with_a_tested_torque_are_those_of_the_estimate_with_it() {
+        let (rows, extra) = rows(0.4, 0.1);
+        let prior = prior([1.0, 1.0], [10.0, 10.0]);
+        let none = vec![None];
+        let regression = Regression::reweighted(&rows, &prior, &none);
+        let at = regression.estimate(&none);
+        let column = std::slice::from_ref(&extra);
+        let score = regression.score(&at, column, &[0.0]).unwrap();
+        let beside =
+            extra.iter().map(|s| s.as_ref().map(|s| s.iter().map(|s| score.size[0] * s).collect())).collect();
+        let (first, fitted) =
+            (regression.with_torques(&at, column, &score), regression.estimate(&beside).residual);
+        assert!((score.size[0] - 0.4).abs() < 0.05, "{:?}", score.size);
+        assert!(first[0].iter().zip(&fitted[0]).all(|(a, b)| (a - b).abs() < 1e-9));
     }
 
     #[test]
