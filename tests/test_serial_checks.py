@@ -118,3 +118,12 @@ def test_logs_without_any_torque(quiet: list[Log], arm: Arm) -> None:
 
 def test_an_arm_that_swings_freely_is_no_defect(arm: Arm) -> None:
     assert find(logs(arm, driven=()), arm)[1] == []
+
+
+def test_units_are_found_where_most_torques_are_too_small(quiet: list[Log], arm: Arm) -> None:
+    scale = np.array([1 / 160, 1 / 7, -1 / 6])
+    corrections, checks = contradictions([replace(log, tau=log.tau * scale) for log in quiet], arm)
+    assert [(check.check, check.joint) for check in checks] == [("torque_unit", j) for j in (1, 2, 3)]
+    found = [corrections.factor[f"tau{j}"] for j in (1, 2, 3)]
+    # Masses are trusted to some ten percent, and a factor is known no better.
+    assert found == pytest.approx(1 / scale, rel=0.3)
