@@ -167,26 +167,39 @@ static void momentum_rows(const struct chain_baseline *b, struct chain_state *s)
 	}
 }
 
+/* Energies need no vectors of several links in one frame: velocity and gravity go from link to link, in the axes of each. */
 static void energy_row(const struct chain_baseline *b, const double *q, const double *dq, double *row)
 {
-	struct kinematics k;
-	double whole[11 * N];
-	move(b, q, dq, &k);
+	double whole[11 * N], along = 0;
+	vec w = {0, 0, 0}, v = {0, 0, 0}, g;
+	memcpy(g, b->gravity, sizeof g);
 	for (int l = 0; l < N; l++) {
-		struct twist x = in_link(&k, l, &k.velocity[l]);
-		double *e = &whole[10 * l];
-		vec g, h;
-		turn_back(k.R[l], b->gravity, g);
-		cross(x.v, x.w, h);
-		e[0] = 0.5 * dot(x.v, x.v) + b->height[l] - dot(b->gravity, k.p[l]);
-		for (int c = 0; c < 3; c++)
-			e[1 + c] = h[c] + b->turned_gravity[l][c] - g[c];
-		e[4] = 0.5 * x.w[0] * x.w[0];
-		e[5] = x.w[0] * x.w[1];
-		e[6] = 0.5 * x.w[1] * x.w[1];
-		e[7] = x.w[0] * x.w[2];
-		e[8] = x.w[1] * x.w[2];
-		e[9] = 0.5 * x.w[2] * x.w[2];
+		const struct chain_joint *joint = &b->joints[l];
+		const struct chain_turn *turn = &b->turns[l];
+		double c = cos(q[l]), s = sin(q[l]), R[3][3], *e = &whole[10 * l];
+		vec h;
+		for (int i = 0; i < 3; i++)
+			for (int k = 0; k < 3; k++)
+				R[i][k] = turn->fixed[i][k] + c * turn->cosine[i][k] + s * turn->sine[i][k];
+		along += dot(g, joint->translation);
+		cross_add(w, joint->translation, v);
+		turn_back(R, w, h);
+		for (int i = 0; i < 3; i++)
+			w[i] = h[i] + joint->axis[i] * dq[l];
+		turn_back(R, v, h);
+		memcpy(v, h, sizeof v);
+		turn_back(R, g, h);
+		memcpy(g, h, sizeof g);
+		cross(v, w, h);
+		e[0] = 0.5 * dot(v, v) + b->height[l] - along;
+		for (int i = 0; i < 3; i++)
+			e[1 + i] = h[i] + b->turned_gravity[l][i] - g[i];
+		e[4] = 0.5 * w[0] * w[0];
+		e[5] = w[0] * w[1];
+		e[6] = 0.5 * w[1] * w[1];
+		e[7] = w[0] * w[2];
+		e[8] = w[1] * w[2];
+		e[9] = 0.5 * w[2] * w[2];
 	}
 	for (int j = 0; j < N; j++)
 		whole[10 * N + j] = 0.5 * dq[j] * dq[j];
@@ -260,9 +273,14 @@ static int inertial(const struct chain_baseline *b)
 
 /* ---- the two models ---- */
 
+static const struct chain_state *before(const struct chain_baseline *b)
+{
+	return &b->state[(b->samples + 1) % 2];
+}
+
 static void dynamic(struct chain_baseline *b, const struct chain_state *now, const double *tau_after)
 {
-	const struct chain_state *s = &b->state;
+	const struct chain_state *s = before(b);
 	int count = inertial(b);
 	for (int j = 0; j < N; j++) {
 		double psi[ROOM] = {0};
@@ -291,7 +309,7 @@ static double power_of(const double *tau, const double *dq)
 
 static void power(struct chain_baseline *b, const struct chain_state *now, const double *tau_after)
 {
-	const struct chain_state *s = &b->state;
+	const struct chain_state *s = before(b);
 	int count = inertial(b);
 	double psi[ROOM] = {0}, middle[ROOM], q[N], dq[N];
 	for (int j = 0; j < N; j++) {
@@ -330,21 +348,20 @@ static void rows(const struct chain_baseline *b, struct chain_state *s)
 static void update(struct chain_baseline *b, const double *q, const double *tau)
 {
 	if (b->samples > 0) {
-		struct chain_state now;
+		struct chain_state *now = &b->state[b->samples % 2];
 		for (int j = 0; j < N; j++) {
-			now.q[j] = 0.5 * (b->q[j] + q[j]);
-			now.dq[j] = (q[j] - b->q[j]) / b->h;
+			now->q[j] = 0.5 * (b->q[j] + q[j]);
+			now->dq[j] = (q[j] - b->q[j]) / b->h;
 		}
-		rows(b, &now);
+		rows(b, now);
 		if (b->samples == 1) {
-			memcpy(b->low_momentum, now.momentum, sizeof b->low_momentum);
-			memcpy(b->low_energy, now.energy, sizeof b->low_energy);
+			memcpy(b->low_momentum, now->momentum, sizeof b->low_momentum);
+			memcpy(b->low_energy, now->energy, sizeof b->low_energy);
 		} else if (b->power) {
-			power(b, &now, b->tau);
+			power(b, now, b->tau);
 		} else {
-			dynamic(b, &now, b->tau);
+			dynamic(b, now, b->tau);
 		}
-		b->state = now;
 	}
 	memcpy(b->q, q, sizeof b->q);
 	memcpy(b->tau_before, b->tau, sizeof b->tau);
@@ -373,6 +390,19 @@ void chain_start(struct chain_baseline *b, int power, const double *joints, cons
 	b->bulge = 4 / x * (1 - 2 / x + b->decay * (1 + 2 / x));
 	for (int i = 0; i < r; i++)
 		b->P[i][i] = p0;
+	for (int l = 0; l < N; l++) {
+		const struct chain_joint *joint = &b->joints[l];
+		const double *a = joint->axis;
+		vec axis;
+		turn(joint->rotation, a, axis);
+		for (int i = 0; i < 3; i++) {
+			cross(joint->rotation[i], a, b->turns[l].sine[i]);
+			for (int c = 0; c < 3; c++) {
+				b->turns[l].fixed[i][c] = axis[i] * a[c];
+				b->turns[l].cosine[i][c] = joint->rotation[i][c] - axis[i] * a[c];
+			}
+		}
+	}
 	move(b, zero, zero, &k);
 	for (int l = 0; l < N; l++) {
 		b->height[l] = dot(gravity, k.p[l]);

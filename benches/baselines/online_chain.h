@@ -9,6 +9,11 @@ struct chain_joint {
 	double rotation[3][3], translation[3], axis[3];
 };
 
+/* Rotation from a link's frame into that of its parent: fixed + cosine cos q + sine sin q. */
+struct chain_turn {
+	double fixed[3][3], cosine[3][3], sine[3][3];
+};
+
 struct chain_state {
 	double q[JOINTS], dq[JOINTS];
 	/* Columns in use: momentum and the rest of each joint, or the energy. */
@@ -19,12 +24,14 @@ struct chain_baseline {
 	double theta[ROOM];
 	double P[ROOM][ROOM];
 	struct chain_joint joints[JOINTS];
+	struct chain_turn turns[JOINTS];
 	double gravity[3], height[JOINTS], turned_gravity[JOINTS][3];
 	int r, columns[ROOM], power;
 	long samples;
 	double h, lambda, decay, first, last, bulge, half_decay, half_first, half_last;
 	double q[JOINTS], tau[JOINTS], tau_before[JOINTS];
-	struct chain_state state;
+	/* The last state and the one before, in turn; state[samples % 2] is the next to be written. */
+	struct chain_state state[2];
 	double low_momentum[JOINTS][ROOM], low_rest[JOINTS][ROOM], low_energy[ROOM];
 	double viscous[JOINTS], coulomb[JOINTS], torque[JOINTS], supply;
 };

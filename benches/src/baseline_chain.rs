@@ -40,6 +40,11 @@ unsafe extern "C" {
     fn chain_size() -> c_long;
 }
 
+/// Cache line of the C estimator's state: aligned as that of `armgap-core` is, so that chance of an address does not decide.
+#[derive(Clone, Copy)]
+#[repr(align(64))]
+struct Line([f64; 8]);
+
 /// Joints, gravity, estimated parameters, and positions, rad, and torques, N m, of a motion as arrays for the C estimator.
 #[derive(Debug, Clone)]
 pub struct ChainArrays {
@@ -75,13 +80,13 @@ impl ChainArrays {
         let count = self.columns.len();
         let samples = c_long::try_from(self.q.len() / JOINTS).expect("a motion of some seconds");
         // SAFETY: the state is as large as the C code says, and the arrays hold what it reads.
-        let state = unsafe {
+        let state: Vec<Line> = unsafe {
             let bytes = usize::try_from(chain_size()).expect("a size");
-            let mut state = vec![0.0; bytes.div_ceil(size_of::<f64>())];
+            let mut state: Vec<Line> = vec![Line([0.0; 8]); bytes.div_ceil(size_of::<Line>())];
             let (joints, columns) = (self.joints.as_ptr(), self.columns.as_ptr());
             let r = c_int::try_from(count).expect("a small count");
             start(
-                state.as_mut_ptr(),
+                state.as_mut_ptr().cast(),
                 c_int::from(power),
                 joints,
                 self.gravity.as_ptr(),
@@ -91,9 +96,9 @@ impl ChainArrays {
                 50.0,
                 1000.0,
             );
-            run(state.as_mut_ptr(), self.q.as_ptr(), self.tau.as_ptr(), samples);
+            run(state.as_mut_ptr().cast(), self.q.as_ptr(), self.tau.as_ptr(), samples);
             state
         };
-        state[..count].to_vec()
+        state.iter().flat_map(|line: &Line| line.0).take(count).collect()
     }
 }

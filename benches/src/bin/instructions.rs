@@ -30,13 +30,14 @@ fn main() {
     };
     let variant = if word(2) == "paper" { Variant::Paper } else { Variant::Exact };
     let form = if word(3) == "plain" { Form::Plain } else { Form::Factorized };
-    let level = if word(5) == "portable" { Level::PORTABLE } else { Level::detect() };
+    let portable = word(5) == "portable";
+    let [level, wide] = if portable { [Level::PORTABLE; 2] } else { [Level::detect(), Level::widest()] };
     if word(6) == "serial" {
         let (chain, _) = serial::arm::<{ serial::JOINTS }>();
         let arm = ChainDescription { joints: chain.joints().to_vec(), gravity: *chain.gravity_vector() };
         let all: Vec<usize> = (0..PARAMETERS_PER_JOINT * serial::JOINTS).collect();
         let base = AmongParameters(&all).of(&arm).expect("seven joints").columns;
-        let mut estimator = serial::fresh(scheme, form, &base).with_level(level);
+        let mut estimator = serial::fresh(scheme, form, &base).with_level(wide);
         let data = serial::samples(count);
         let mut take = |k: usize| {
             let _ = black_box(estimator.update(When::After(PERIOD), &data[k].0, None, &data[k].1));
