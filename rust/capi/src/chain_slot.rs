@@ -16,16 +16,21 @@ const MOST: usize = ChainSize::Large.room()[1];
 /// First word of memory that holds an estimator of a serial arm of this version, before size and precision are mixed in.
 const MARK: u64 = 0x4d47_5241_0002_0000;
 
-/// Contents of the caller's memory: a mark and an estimator of a serial arm.
-#[repr(C)]
-struct Slot<E> {
-    mark: u64,
-    estimator: E,
+/// Mark by which memory with an estimator of this size, in the precision of `T`, at this place in it is recognised.
+const fn mark<T>(size: ChainSize, place: usize) -> u64 {
+    MARK ^ ((place as u64) << 16) ^ ((size_of::<T>() as u64) << 8) ^ (size as u64)
 }
 
-/// Mark by which memory with an estimator of this size, in the precision of `T`, is recognised.
-const fn mark<T>(size: ChainSize) -> u64 {
-    MARK ^ ((size_of::<T>() as u64) << 8) ^ (size as u64)
+/// Place of the estimator in the caller's memory, bytes from its start: the first behind the mark that has the alignment of an estimator. All sizes
+/// have the same alignment; the caller's memory needs that of the mark only.
+fn place<T: Real>(memory: *const c_void) -> usize {
+    let behind = memory.cast::<u8>().wrapping_add(size_of::<u64>());
+    size_of::<u64>() + behind.align_offset(align_of::<LargeChain<T>>())
+}
+
+/// Bytes of memory for an estimator `E` behind a mark, wherever the memory begins.
+const fn bytes_of<E>() -> usize {
+    align_of::<E>() + size_of::<E>()
 }
 
 /// Smallest size of estimator for this number of joints and parameters; `None` if there is none.
@@ -36,18 +41,11 @@ fn size_of_chain(joints: u32, parameters: u32) -> Option<ChainSize> {
 /// Bytes of an estimator for this number of joints and parameters in the precision of `T`; 0 if there is none.
 pub(crate) fn size<T: Real>(joints: u32, parameters: u32) -> usize {
     match size_of_chain(joints, parameters) {
-        Some(ChainSize::Small) => size_of::<Slot<SmallChain<T>>>(),
-        Some(ChainSize::Medium) => size_of::<Slot<MediumChain<T>>>(),
-        Some(ChainSize::Large) => size_of::<Slot<LargeChain<T>>>(),
+        Some(ChainSize::Small) => bytes_of::<SmallChain<T>>(),
+        Some(ChainSize::Medium) => bytes_of::<MediumChain<T>>(),
+        Some(ChainSize::Large) => bytes_of::<LargeChain<T>>(),
         None => 0,
     }
-}
-
-/// The caller's memory as a slot of the largest size, checked for null and alignment; all sizes have the same alignment.
-fn slot_in<T: Real>(memory: *const c_void) -> Result<*const Slot<LargeChain<T>>, armgap_status> {
-    let slot = memory.cast::<Slot<LargeChain<T>>>();
-    usable(slot)?;
-    Ok(slot)
 }
 
 /// Joint of the C interface as `armgap-core` takes it; `None` if its kind is unknown.
@@ -69,7 +67,7 @@ pub(crate) unsafe fn start<T: Real>(
     theta0: *const T,
 ) -> armgap_status {
     answer((|| {
-        slot_in::<T>(memory)?;
+        usable(memory.cast::<u64>())?;
         usable(settings)?;
         // SAFETY: checked above.
         let settings = unsafe { &*settings };
@@ -110,7 +108,7 @@ pub(crate) unsafe fn start<T: Real>(
             columns: chosen.get(..r).ok_or(ARMGAP_RANGE)?,
             known: values.get(..PARAMETERS_PER_JOINT * n).ok_or(ARMGAP_RANGE)?,
         };
-        // SAFETY: not null, aligned, and as large as a slot of this size.
+        // SAFETY: not null, aligned, and as large as an estimator of this size with its mark needs.
         unsafe {
             match which {
                 ChainSize::Small => write::<T, 2, 26, 20>(memory, which, &settings, theta0),
@@ -130,28 +128,50 @@ unsafe fn write<T: Real, const N: usize, const P: usize, const R: usize>(
     theta0: &[T],
 ) -> Result<armgap_status, armgap_status> {
     let estimator = ChainEstimator::<T, N, P, R>::of_chain(settings, theta0).map_err(status_of)?;
-    unsafe { memory.cast::<Slot<_>>().write(Slot { mark: mark::<T>(size), estimator }) };
+    let place = place::<T>(memory);
+    // SAFETY: as promised by the caller; the place is aligned for the estimator.
+    unsafe {
+        memory.cast::<u64>().write(mark::<T>(size, place));
+        memory.byte_add(place).cast::<ChainEstimator<T, N, P, R>>().write(estimator);
+    }
     Ok(ARMGAP_OK)
 }
 
-/// Size of the estimator in the caller's memory by its mark, or the status if there is no estimator.
-unsafe fn marked<T: Real>(memory: *const c_void) -> Result<ChainSize, armgap_status> {
-    let slot = slot_in::<T>(memory)?;
+/// Size and place of the estimator in the caller's memory by its mark, or the status if there is no estimator.
+unsafe fn marked<T: Real>(memory: *const c_void) -> Result<(ChainSize, usize), armgap_status> {
+    usable(memory.cast::<u64>())?;
     // SAFETY: the mark is read alone first, from memory that is large enough for it.
-    let found = unsafe { (&raw const (*slot).mark).read() };
-    ChainSize::ALL.into_iter().find(|size| mark::<T>(*size) == found).ok_or(ARMGAP_NOT_STARTED)
+    let found = unsafe { memory.cast::<u64>().read() };
+    let first = size_of::<u64>();
+    for place in (first..=align_of::<LargeChain<T>>()).step_by(first) {
+        if let Some(size) = ChainSize::ALL.into_iter().find(|size| mark::<T>(*size, place) == found) {
+            return Ok((size, place));
+        }
+    }
+    Err(ARMGAP_NOT_STARTED)
 }
 
-/// Estimator in the caller's memory, or the status if there is none.
-unsafe fn opened<'a, T: Real>(memory: *const c_void) -> Result<&'a dyn OnlineEstimator<T>, armgap_status> {
-    // SAFETY: marked memory was written by `start` with a slot of the size that the mark says.
+/// Result of `read` for the estimator in the caller's memory, or the status if there is none.
+unsafe fn opened<T: Real>(
+    memory: *const c_void,
+    read: impl FnOnce(&dyn OnlineEstimator<T>) -> Result<armgap_status, armgap_status>,
+) -> Result<armgap_status, armgap_status> {
+    // SAFETY: marked memory was written by `start` with an estimator of the size and at the place that the mark says, or is a copy of such memory.
     unsafe {
-        Ok(match marked::<T>(memory)? {
-            ChainSize::Small => &(*memory.cast::<Slot<SmallChain<T>>>()).estimator,
-            ChainSize::Medium => &(*memory.cast::<Slot<MediumChain<T>>>()).estimator,
-            ChainSize::Large => &(*memory.cast::<Slot<LargeChain<T>>>()).estimator,
-        })
+        let (size, place) = marked::<T>(memory)?;
+        let estimator = memory.byte_add(place);
+        match size {
+            ChainSize::Small => seen(estimator.cast::<SmallChain<T>>(), |x| read(x)),
+            ChainSize::Medium => seen(estimator.cast::<MediumChain<T>>(), |x| read(x)),
+            ChainSize::Large => seen(estimator.cast::<LargeChain<T>>(), |x| read(x)),
+        }
     }
+}
+
+/// Result of `read` for an estimator, or, where it is not aligned because its memory was copied, for a copy.
+unsafe fn seen<E: Copy, R>(estimator: *const E, read: impl FnOnce(&E) -> R) -> R {
+    // SAFETY: the caller has found the mark of such an estimator.
+    unsafe { if estimator.is_aligned() { read(&*estimator) } else { read(&estimator.read_unaligned()) } }
 }
 
 /// Estimator in the caller's memory to take a sample, or the status if there is none.
@@ -160,11 +180,26 @@ unsafe fn opened_mut<'a, T: Real>(
 ) -> Result<&'a mut dyn OnlineEstimator<T>, armgap_status> {
     // SAFETY: as above; nobody else holds it during this call.
     unsafe {
-        Ok(match marked::<T>(memory)? {
-            ChainSize::Small => &mut (*memory.cast::<Slot<SmallChain<T>>>()).estimator,
-            ChainSize::Medium => &mut (*memory.cast::<Slot<MediumChain<T>>>()).estimator,
-            ChainSize::Large => &mut (*memory.cast::<Slot<LargeChain<T>>>()).estimator,
+        let (size, from) = marked::<T>(memory)?;
+        Ok(match size {
+            ChainSize::Small => &mut *settled::<T, SmallChain<T>>(memory, size, from),
+            ChainSize::Medium => &mut *settled::<T, MediumChain<T>>(memory, size, from),
+            ChainSize::Large => &mut *settled::<T, LargeChain<T>>(memory, size, from),
         })
+    }
+}
+
+/// Pointer to the estimator at the place `from` of the caller's memory; where it is not aligned because its memory was copied, it is moved first.
+unsafe fn settled<T: Real, E>(memory: *mut c_void, size: ChainSize, from: usize) -> *mut E {
+    let place = place::<T>(memory);
+    // SAFETY: the caller has found the mark of such an estimator, and memory has room for it at any of these places.
+    unsafe {
+        let estimator = memory.byte_add(place).cast::<E>();
+        if place != from {
+            core::ptr::copy(memory.byte_add(from).cast::<u8>(), estimator.cast::<u8>(), size_of::<E>());
+            memory.cast::<u64>().write(mark::<T>(size, place));
+        }
+        estimator
     }
 }
 
@@ -185,29 +220,31 @@ pub(crate) unsafe fn update<T: Real>(
 }
 
 pub(crate) unsafe fn theta<T: Real>(memory: *const c_void, to: *mut T, count: usize) -> armgap_status {
-    answer((|| unsafe { give(opened::<T>(memory)?.theta(), to, count) })())
+    answer(unsafe { opened::<T>(memory, |estimator| give(estimator.theta(), to, count)) })
 }
 
 pub(crate) unsafe fn errors<T: Real>(memory: *const c_void, to: *mut T, count: usize) -> armgap_status {
-    answer((|| unsafe { give(opened::<T>(memory)?.errors(), to, count) })())
+    answer(unsafe { opened::<T>(memory, |estimator| give(estimator.errors(), to, count)) })
 }
 
 pub(crate) unsafe fn variances<T: Real>(memory: *const c_void, to: *mut T, count: usize) -> armgap_status {
-    answer((|| {
+    let variances = |estimator: &dyn OnlineEstimator<T>| {
         let mut variances = [T::zero(); MOST];
-        let parameters = unsafe { opened::<T>(memory)? }.variances(&mut variances);
+        let parameters = estimator.variances(&mut variances);
         unsafe { give(variances.get(..parameters).unwrap_or(&variances), to, count) }
-    })())
+    };
+    answer(unsafe { opened::<T>(memory, variances) })
 }
 
 pub(crate) unsafe fn sigma<T: Real>(memory: *const c_void, to: *mut T, count: usize) -> armgap_status {
-    answer((|| {
+    let sigma = |estimator: &dyn OnlineEstimator<T>| {
         let mut sigma = [T::zero(); MOST];
-        let parameters = unsafe { opened::<T>(memory)? }.sigma(&mut sigma);
+        let parameters = estimator.sigma(&mut sigma);
         unsafe { give(sigma.get(..parameters).unwrap_or(&sigma), to, count) }
-    })())
+    };
+    answer(unsafe { opened::<T>(memory, sigma) })
 }
 
 pub(crate) unsafe fn report<T: Real>(memory: *const c_void, to: *mut armgap_report) -> armgap_status {
-    answer((|| unsafe { fill_report(opened::<T>(memory)?, to) })())
+    answer(unsafe { opened::<T>(memory, |estimator| fill_report(estimator, to)) })
 }

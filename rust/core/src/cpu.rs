@@ -2,8 +2,8 @@
 //!
 //! One Python wheel and one library run on every x86-64 processor, while four doubles at once and `a b + c` with one rounding reduce the computing
 //! time of a sample by a third. So the hot code is written once, generic over a [`Cpu`], and compiled on x86-64 for every processor, for processors
-//! with AVX2 and FMA, and for [`Level::run_wide`] also for AVX-512. A [`Level`] says which version runs, and one call without a branch in between
-//! enters the code.
+//! with AVX2 and FMA, and for [`Level::run_wide`], which rollouts and estimators of many parameters use, also for AVX-512. A [`Level`] says which
+//! version runs, and one call without a branch in between enters the code.
 //!
 //! `a b + c` goes through [`Cpu::fused`], because a compiler does not fuse product and sum on its own, and because the standard library's `mul_add`
 //! is a function call where the instruction is missing. Everything below [`Kernel::run`] has to be inlined: a function that stays outside is compiled
@@ -90,7 +90,7 @@ enum InstructionSet {
     /// AVX2 and FMA; made by [`Level::detect`] alone, where the processor has both.
     #[cfg(all(feature = "std", target_arch = "x86_64"))]
     Avx2,
-    /// AVX-512 in addition to AVX2 and FMA; made by [`Level::widest`] alone, where the processor has all three.
+    /// AVX-512 in addition to AVX2 and FMA; made by [`Level::widest`] alone, where the processor has all of them.
     #[cfg(all(feature = "std", target_arch = "x86_64"))]
     Avx512,
 }
@@ -114,11 +114,16 @@ impl Level {
         Self::PORTABLE
     }
 
-    /// Level of AVX-512, eight doubles at once, where the processor has it, else [`Level::detect`]; for kernels run by [`Level::run_wide`].
+    /// Level of AVX-512 (F, DQ and VL), eight doubles at once, where the processor has it, else [`Level::detect`]; for kernels run by
+    /// [`Level::run_wide`].
     #[inline]
     pub fn widest() -> Self {
         #[cfg(all(feature = "std", target_arch = "x86_64"))]
-        if Self::detect() != Self::PORTABLE && std::arch::is_x86_feature_detected!("avx512f") {
+        if Self::detect() != Self::PORTABLE
+            && std::arch::is_x86_feature_detected!("avx512f")
+            && std::arch::is_x86_feature_detected!("avx512dq")
+            && std::arch::is_x86_feature_detected!("avx512vl")
+        {
             return Self(InstructionSet::Avx512);
         }
         Self::detect()
@@ -184,12 +189,12 @@ fn avx2<W: Kernel>(kernel: W) -> W::Output {
 #[inline(always)]
 #[allow(unsafe_code)]
 fn on_avx512<W: Kernel>(kernel: W) -> W::Output {
-    // SAFETY: called for `InstructionSet::Avx512` only, which only `Level::widest` makes, after asking the processor for all three.
+    // SAFETY: called for `InstructionSet::Avx512` only, which only `Level::widest` makes, after asking the processor for all of them.
     unsafe { avx512(kernel) }
 }
 
 #[cfg(all(feature = "std", target_arch = "x86_64"))]
-#[target_feature(enable = "avx2,fma,avx512f")]
+#[target_feature(enable = "avx2,fma,avx512f,avx512dq,avx512vl")]
 fn avx512<W: Kernel>(kernel: W) -> W::Output {
     kernel.run::<Fused<8>>()
 }

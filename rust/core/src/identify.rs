@@ -155,7 +155,7 @@ impl<T: Real, A: Arm<T, N, P>, S: Columns<T, N, P, R>, const N: usize, const P: 
         self
     }
 
-    /// Changes the instruction set that samples are processed with; the default is [`Level::detect`].
+    /// Changes the instruction set that samples are processed with; the default is that of [`Rls::with_level`].
     pub fn with_level(mut self, level: Level) -> Self {
         self.rls = self.rls.with_level(level);
         self
@@ -177,7 +177,8 @@ impl<T: Real, A: Arm<T, N, P>, S: Columns<T, N, P, R>, const N: usize, const P: 
     pub fn update(&mut self, sample: &Sample<T, N>) -> Outcome<T, N> {
         let Sample { t, q, dq, tau } = sample;
         let h = if self.past.seen == Seen::Nothing { T::one() } else { *t - self.past.t };
-        self.rls.level().run(SampleKernel { estimator: self, t: *t, h, q, dq: dq.as_ref(), tau })
+        let level = self.rls.level();
+        Rls::<T, R, S::Count>::run(level, SampleKernel { estimator: self, t: *t, h, q, dq: dq.as_ref(), tau })
     }
 
     /// Takes one sample of the arm's motion `h` seconds after the last one, and updates the estimate; `h` of the first sample may be any positive
@@ -186,7 +187,8 @@ impl<T: Real, A: Arm<T, N, P>, S: Columns<T, N, P, R>, const N: usize, const P: 
     pub fn update_after(&mut self, h: T, reading: &Reading<T, N>) -> Outcome<T, N> {
         let Reading { q, dq, tau } = reading;
         let t = self.past.t + h;
-        self.rls.level().run(SampleKernel { estimator: self, t, h, q, dq: dq.as_ref(), tau })
+        let level = self.rls.level();
+        Rls::<T, R, S::Count>::run(level, SampleKernel { estimator: self, t, h, q, dq: dq.as_ref(), tau })
     }
 
     #[inline(always)]

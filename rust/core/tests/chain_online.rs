@@ -18,8 +18,9 @@ const SAMPLES: usize = 3000;
 const GRAVITY: [f64; 3] = [0.0, 0.3, -9.8];
 const P: usize = 39;
 
-/// Largest difference of estimates by rounding in least squares over some thousand samples, relative to the largest entry.
-const ROUNDING: f64 = 1e-7;
+/// Largest difference of estimates by rounding in least squares over some thousand samples, relative to the largest entry; with the paper's filters
+/// and dependent columns two ways to round the plain form differ from the factorized form by 2e-8 and 1.2e-7.
+const ROUNDING: f64 = 5e-7;
 /// Largest relative error of the estimates, whose velocities are differences of positions and whose torques are held.
 const ACCURACY: f64 = 0.02;
 

@@ -121,7 +121,7 @@ impl<T: Real, A: Arm<T, N, P>, S: Columns<T, N, P, R>, const N: usize, const P: 
         }
     }
 
-    /// Changes the instruction set that samples are processed with; the default is [`Level::detect`].
+    /// Changes the instruction set that samples are processed with; the default is that of [`crate::rls::Rls::with_level`].
     pub fn with_level(mut self, level: Level) -> Self {
         self.estimator = self.estimator.with_level(level);
         self

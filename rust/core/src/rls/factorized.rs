@@ -19,12 +19,20 @@ use nalgebra::SMatrix;
 
 /// Factors of the covariance `P = U D U'`; `u` column by column with ones on the diagonal and zeros below.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Factorized<T, const R: usize> {
+#[repr(C)]
+pub(super) struct Factorized<T, A, const R: usize> {
     u: [[T; R]; R],
     d: [T; R],
+    /// Nothing; its type aligns `u`.
+    align: [A; 0],
 }
 
-impl<T: Real, const R: usize> Factorized<T, R> {
+impl<T: Real, A: Copy, const R: usize> Factorized<T, A, R> {
+    /// The same covariance in another alignment.
+    pub(super) fn aligned<B>(&self) -> Factorized<T, B, R> {
+        Factorized { u: self.u, d: self.d, align: [] }
+    }
+
     pub(super) fn of(p: &SMatrix<T, R, R>) -> Self {
         let mut p = *p;
         let mut u = [[T::zero(); R]; R];
@@ -42,7 +50,7 @@ impl<T: Real, const R: usize> Factorized<T, R> {
                 }
             }
         }
-        Self { u, d }
+        Self { u, d, align: [] }
     }
 
     pub(super) fn matrix(&self) -> SMatrix<T, R, R> {

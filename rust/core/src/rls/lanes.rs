@@ -10,6 +10,9 @@ use core::fmt::Debug;
 /// Number of entries of a small vector that recursive least squares takes together: four doubles fill a vector of AVX2.
 pub(super) const LANES: usize = 4;
 
+/// Smallest room for parameters for which a covariance is worked on in blocks of rows.
+const MANY: usize = 16;
+
 /// Number of entries, of `n`, that fill whole groups of four.
 #[inline(always)]
 pub(super) const fn lead(n: usize) -> usize {
@@ -44,6 +47,12 @@ pub(super) fn all_within<T: Real, const R: usize>(a: &[T; R], limit: T) -> bool 
 
 /// Number of parameters in use, at most the number that the estimator has room for.
 pub trait Count: Copy + Debug + PartialEq {
+    /// Type whose alignment columns of the covariance get: of a cache line for many parameters, so that no vector is spread over two lines.
+    type Align: Copy + Debug + PartialEq;
+
+    /// Whether a covariance with room for `room` parameters is worked on in blocks of rows, with vectors as wide as the processor has.
+    fn in_blocks(room: usize) -> bool;
+
     /// Number of parameters in use in an estimator with room for `room` parameters.
     fn of(self, room: usize) -> usize;
 
@@ -56,6 +65,14 @@ pub trait Count: Copy + Debug + PartialEq {
 pub struct All;
 
 impl Count for All {
+    type Align = ();
+
+    /// False: with a number that they know, compilers find vectors by themselves, and lose those of blocks.
+    #[inline(always)]
+    fn in_blocks(_: usize) -> bool {
+        false
+    }
+
     #[inline(always)]
     fn of(self, room: usize) -> usize {
         room
@@ -69,6 +86,11 @@ impl Count for All {
     }
 }
 
+/// Type with the alignment of a cache line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(align(64))]
+pub struct CacheLine;
+
 /// The first parameters, in a number chosen at run time; columns are worked on in whole groups of four.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct First(usize);
@@ -81,6 +103,13 @@ impl First {
 }
 
 impl Count for First {
+    type Align = CacheLine;
+
+    #[inline(always)]
+    fn in_blocks(room: usize) -> bool {
+        room >= MANY
+    }
+
     #[inline(always)]
     fn of(self, room: usize) -> usize {
         self.0.min(room)

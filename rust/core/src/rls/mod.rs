@@ -13,6 +13,7 @@
 mod factorized;
 mod lanes;
 mod plain;
+mod wide;
 
 use crate::cpu::{Cpu, Kernel, Level};
 use crate::real::{Real, lit};
@@ -46,7 +47,7 @@ impl Form {
 pub struct Rls<T: Real, const R: usize, N: Count = All> {
     theta: SVector<T, R>,
     count: N,
-    covariance: Covariance<T, R>,
+    covariance: Covariance<T, N::Align, R>,
     forgetting: Forgetting<T, R>,
     level: Level,
     leverage: T,
@@ -55,9 +56,9 @@ pub struct Rls<T: Real, const R: usize, N: Count = All> {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Covariance<T: Real, const R: usize> {
-    Plain(Plain<T, R>),
-    Factorized(Factorized<T, R>),
+enum Covariance<T: Real, A, const R: usize> {
+    Plain(Plain<T, A, R>),
+    Factorized(Factorized<T, A, R>),
 }
 
 /// Forgetting factor `mu`, and for each parameter the variance above which forgetting does not lift it.
@@ -103,6 +104,11 @@ impl<T: Real, const R: usize, N: Count> Rls<T, R, N> {
     /// Restricts the estimate to the first `count` parameters; regressor rows must be zero beyond them.
     pub fn with_count<K: Count>(self, count: K) -> Rls<T, R, K> {
         let Self { theta, covariance, forgetting, level, leverage, updates, rejected, .. } = self;
+        let covariance = match covariance {
+            Covariance::Plain(p) => Covariance::Plain(p.aligned()),
+            Covariance::Factorized(p) => Covariance::Factorized(p.aligned()),
+        };
+        let level = if K::in_blocks(R) && level == Level::detect() { Level::widest() } else { level };
         Rls { theta, count, covariance, forgetting, level, leverage, updates, rejected }
     }
 
@@ -112,10 +118,17 @@ impl<T: Real, const R: usize, N: Count> Rls<T, R, N> {
         self
     }
 
-    /// Changes the instruction set that samples are processed with; the default is [`Level::detect`].
+    /// Changes the instruction set that samples are processed with; the default is [`Level::detect`], with [`First`] of
+    /// many parameters [`Level::widest`].
     pub fn with_level(mut self, level: Level) -> Self {
         self.level = level;
         self
+    }
+
+    /// Runs a kernel that works on the estimator, with vectors as wide as pay for `R` parameters.
+    #[inline(always)]
+    pub(crate) fn run<W: Kernel>(level: Level, kernel: W) -> W::Output {
+        if N::in_blocks(R) { level.run_wide(kernel) } else { level.run(kernel) }
     }
 
     /// Instruction set in use.
@@ -182,7 +195,7 @@ impl<T: Real, const R: usize, N: Count> Rls<T, R, N> {
                 rows[m][j] = psi[(m, j)];
             }
         }
-        self.level.run(UpdateKernel { rls: self, rows, y: y.data.0[0] })
+        Self::run(self.level, UpdateKernel { rls: self, rows, y: y.data.0[0] })
     }
 
     /// Updates the estimate by one sample of `M` equations `y = rows theta`; for callers that are already compiled for the processor's instructions
@@ -193,7 +206,11 @@ impl<T: Real, const R: usize, N: Count> Rls<T, R, N> {
         let mut sound = true;
         let (theta, count) = (&mut self.theta.data.0[0], self.count);
         for m in 0..M {
-            error[m] -= lanes::dot::<C, T, R>(&rows[m], theta, count.of(R));
+            error[m] -= if N::in_blocks(R) {
+                wide::dot::<C, T, R>(&rows[m], theta, count.of(R))
+            } else {
+                lanes::dot::<C, T, R>(&rows[m], theta, count.of(R))
+            };
             sound &= error[m].abs() <= largest();
         }
         let leverage = match &mut self.covariance {
@@ -230,7 +247,7 @@ impl<T: Real, N: Count, const M: usize, const R: usize> Kernel for UpdateKernel<
     }
 }
 
-impl<T: Real, const R: usize> Covariance<T, R> {
+impl<T: Real, A: Copy, const R: usize> Covariance<T, A, R> {
     fn of(p: &SMatrix<T, R, R>, form: Form) -> Self {
         match form {
             Form::Plain => Self::Plain(Plain::of(p)),

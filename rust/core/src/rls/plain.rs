@@ -5,24 +5,33 @@
 //! columns.
 
 use super::lanes::{LANES, dot, lead};
-use super::{Count, Forgetting};
+use super::{Count, Forgetting, wide};
 use crate::cpu::Cpu;
 use crate::real::{Real, lit};
 use nalgebra::SMatrix;
 
 /// Covariance `P`, column by column, and a copy of its diagonal for the check that it stays positive.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Plain<T, const R: usize> {
+#[repr(C)]
+pub(super) struct Plain<T, A, const R: usize> {
     p: [[T; R]; R],
     diagonal: [T; R],
+    /// Nothing; its type aligns `p`.
+    align: [A; 0],
 }
 
-impl<T: Real, const R: usize> Plain<T, R> {
+impl<T: Real, A: Copy, const R: usize> Plain<T, A, R> {
     pub(super) fn of(p: &SMatrix<T, R, R>) -> Self {
         Self {
             p: core::array::from_fn(|j| core::array::from_fn(|i| p[(i.min(j), i.max(j))])),
             diagonal: core::array::from_fn(|i| p[(i, i)]),
+            align: [],
         }
+    }
+
+    /// The same covariance in another alignment.
+    pub(super) fn aligned<B>(&self) -> Plain<T, B, R> {
+        Plain { p: self.p, diagonal: self.diagonal, align: [] }
     }
 
     pub(super) fn matrix(&self) -> SMatrix<T, R, R> {
@@ -44,6 +53,9 @@ impl<T: Real, const R: usize> Plain<T, R> {
         count: N,
         forgetting: &Forgetting<T, R>,
     ) -> Option<T> {
+        if N::in_blocks(R) {
+            return self.learn_many::<C, N, M>(theta, rows, error, count, forgetting);
+        }
         let r = count.of(R);
         let (mut gain, mut rate, mut inverse) = (self.times::<C, M>(rows, r), *error, [T::zero(); M]);
         // `mu I + Psi' P Psi`, of which the upper triangle counts.
@@ -84,6 +96,71 @@ impl<T: Real, const R: usize> Plain<T, R> {
             }
         }
         self.take_off::<C, M>(&gain, &inverse, r);
+        if forgetting.mu < T::one() {
+            self.forget(forgetting, r);
+        }
+        Some(leverage)
+    }
+
+    /// Same as [`Self::learn`] for many parameters: `mu I + Psi' P Psi = L L'`, `H = P Psi L'^-1`, and `P - H H'`.
+    #[inline(always)]
+    fn learn_many<C: Cpu, N: Count, const M: usize>(
+        &mut self,
+        theta: &mut [T; R],
+        rows: &[[T; R]; M],
+        error: &[T; M],
+        count: N,
+        forgetting: &Forgetting<T, R>,
+    ) -> Option<T> {
+        let r = count.of(R);
+        let mut h = wide::times::<C, T, M, R>(&self.p, rows, r);
+        let mut total = wide::products::<C, T, M, R>(&h, rows, r);
+        let (mut rate, mut inverse, mut leverage, mut sound) = (*error, [T::zero(); M], T::zero(), true);
+        for m in 0..M {
+            total[m][m] += forgetting.mu;
+            // Beyond this limit the updated `P` in the direction of the row would consist of rounding errors.
+            sound &= total[m][m] * T::default_epsilon() <= forgetting.mu * lit(0.125);
+        }
+        for m in 0..M {
+            // Row `m` of `total` becomes column `m` of `L`, its diagonal stays that of `L` squared.
+            sound &= total[m][m] > T::zero();
+            inverse[m] = T::one() / total[m][m].sqrt();
+            rate[m] *= inverse[m];
+            leverage += T::one() - forgetting.mu * (inverse[m] * inverse[m]);
+            for n in m + 1..M {
+                total[m][n] *= inverse[m];
+                rate[n] = C::fused(-total[m][n], rate[m], rate[n]);
+            }
+            for n in m + 1..M {
+                for k in n..M {
+                    total[n][k] = C::fused(-total[m][n], total[m][k], total[n][k]);
+                }
+            }
+        }
+        let mut positive = true;
+        for i in 0..r {
+            let mut variance = self.diagonal[i];
+            for m in 0..M {
+                let mut entry = h[m][i];
+                for k in 0..m {
+                    entry = C::fused(-total[k][m], h[k][i], entry);
+                }
+                entry *= inverse[m];
+                h[m][i] = entry;
+                variance = C::fused(-entry, entry, variance);
+            }
+            positive &= variance > T::zero();
+        }
+        if !(sound & positive) {
+            return None;
+        }
+        for i in 0..r {
+            for m in 0..M {
+                self.diagonal[i] = C::fused(-h[m][i], h[m][i], self.diagonal[i]);
+                theta[i] = C::fused(h[m][i], rate[m], theta[i]);
+            }
+        }
+        wide::take_off::<C, T, M, R>(&mut self.p, &h, r);
         if forgetting.mu < T::one() {
             self.forget(forgetting, r);
         }
