@@ -116,6 +116,22 @@ pub fn sines_cosines<C: Cpu, T: Real, const N: usize>(angles: [T; N]) -> [SinCos
     })
 }
 
+/// Sines and cosines of any number of angles, rad, eight at a time side by side.
+#[inline(always)]
+pub(crate) fn sines_cosines_of_many<C: Cpu, T: Real, const N: usize>(angles: &[T; N]) -> [SinCos<T>; N] {
+    let mut found = [SinCos { sine: T::zero(), cosine: T::one() }; N];
+    for (angles, found) in angles.chunks(8).zip(found.chunks_mut(8)) {
+        let mut padded = [T::zero(); 8];
+        for (place, angle) in padded.iter_mut().zip(angles) {
+            *place = *angle;
+        }
+        for (place, both) in found.iter_mut().zip(sines_cosines::<C, T, 8>(padded)) {
+            *place = both;
+        }
+    }
+    found
+}
+
 /// Sine and cosine of the angle `x`, rad, by the series alone; valid up to [`largest`].
 #[inline(always)]
 pub(crate) fn series_of<V: Number>(x: V) -> (V, V) {

@@ -99,6 +99,12 @@ impl ArmKind {
     }
 }
 
+/// Taker of columns of the regressors of momentum and of `g - dK/dq`; see [`Arm::momentum_columns`].
+pub trait MomentumColumns<T, const N: usize> {
+    /// Takes neighbouring columns of both regressors, of which the first is column `first`; with `#[inline(always)]`, as it is part of a kernel.
+    fn put(&mut self, first: usize, momentum: &[[T; N]], potential: &[[T; N]]);
+}
+
 /// A serial arm with `N` joints and `P` parameters, in which its dynamics are linear.
 ///
 /// Required methods are the equations of one kind of arm; provided methods follow from them.
@@ -138,6 +144,13 @@ pub trait Arm<T: Real, const N: usize, const P: usize>: Clone + Send + Sync {
         self.energy_regressor(q, dq)
     }
 
+    /// Same as [`Arm::energy_regressor_on`] at two states `[q, dq]`; an arm overrides this method to compute both side by side.
+    #[inline(always)]
+    fn energy_regressors_on<C: Cpu>(&self, states: [[&SVector<T, N>; 2]; 2]) -> [SVector<T, P>; 2] {
+        let [[q, dq], [other_q, other_dq]] = states;
+        [self.energy_regressor_on::<C>(q, dq), self.energy_regressor_on::<C>(other_q, other_dq)]
+    }
+
     /// [`Arm::momentum_regressor`] and [`Arm::potential_regressor`], for the online estimator; an arm overrides this method to compute shared terms
     /// once.
     #[inline(always)]
@@ -147,6 +160,23 @@ pub trait Arm<T: Real, const N: usize, const P: usize>: Clone + Send + Sync {
         dq: &SVector<T, N>,
     ) -> (SMatrix<T, N, P>, SMatrix<T, N, P>) {
         (self.momentum_regressor(q, dq), self.potential_regressor(q, dq))
+    }
+
+    /// The inertial columns of [`Arm::momentum_and_potential`], for the online estimator, given to `sink` as soon as they are computed, each once; an
+    /// arm with many parameters overrides this method, so that the matrices need not pass through memory.
+    #[inline(always)]
+    fn momentum_columns<C: Cpu>(
+        &self,
+        q: &SVector<T, N>,
+        dq: &SVector<T, N>,
+        sink: &mut impl MomentumColumns<T, N>,
+    ) {
+        let (momentum, potential) = self.momentum_and_potential::<C>(q, dq);
+        if let (Some(momentum), Some(potential)) =
+            (momentum.data.0.get(..Self::INERTIAL), potential.data.0.get(..Self::INERTIAL))
+        {
+            sink.put(0, momentum, potential);
+        }
     }
 
     /// Change of `theta` when a point `mass`, kg, is fixed `distance`, m, along the last link.

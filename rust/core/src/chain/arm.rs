@@ -7,11 +7,12 @@
 use super::inertia::{LINK_PARAMETERS, LinkInertia, point_mass};
 use super::parameters::PARAMETERS_PER_JOINT;
 use super::{Chain, vector};
-use crate::arm::{Arm, EquationTerms, Parameter};
+use crate::arm::{Arm, EquationTerms, MomentumColumns, Parameter};
 use crate::cpu::{Cpu, Portable};
+use crate::lanes::Lanes;
 use crate::number::Number;
 use crate::real::{Real, lit};
-use crate::trig::SinCos;
+use crate::trig::{SinCos, sines_cosines_of_many};
 use nalgebra::{SMatrix, SVector};
 
 /// The ten inertial parameters of every link, from `theta`; `None` if `theta` is too short, which [`check`] rules out.
@@ -67,6 +68,38 @@ impl<T: Real, const N: usize> Chain<T, N> {
         [q, dq]: [&[V; N]; 2],
     ) -> EquationTerms<V, N> {
         self.equation_terms_at(&self.poses_at(sincos, q), links, constant_inertia, dq)
+    }
+
+    /// [`Arm::momentum_columns`] with the joints in `W` lanes, at least `N`.
+    #[inline(always)]
+    fn momentum_columns_by<C: Cpu, const W: usize>(
+        &self,
+        q: &[T; N],
+        dq: &[T; N],
+        sink: &mut impl MomentumColumns<T, N>,
+    ) {
+        let sincos = sines_cosines_of_many::<C, T, N>(&self.angles_of(q));
+        let mut units = [Lanes::<T, C, W>::of(T::zero()); N];
+        for j in 0..N {
+            if let Some(entry) = units[j].0.get_mut(j) {
+                *entry = T::one();
+            }
+        }
+        self.momentum_columns(&sincos, [q, dq], &units, |k, momentum, potential| {
+            let (mut columns, mut others) =
+                ([[T::zero(); N]; LINK_PARAMETERS], [[T::zero(); N]; LINK_PARAMETERS]);
+            for c in 0..LINK_PARAMETERS {
+                for i in 0..N.min(W) {
+                    (columns[c][i], others[c][i]) = (momentum[c].0[i], potential[c].0[i]);
+                }
+            }
+            sink.put(LINK_PARAMETERS * k, &columns, &others);
+        });
+        let (mut rotors, none) = ([[T::zero(); N]; N], [[T::zero(); N]; N]);
+        for j in 0..N {
+            rotors[j][j] = dq[j];
+        }
+        sink.put(first_rotor(N), &rotors, &none);
     }
 
     /// `C(q, dq) dq`, N m (N): the bias without gravity.
@@ -152,13 +185,61 @@ impl<T: Real, const N: usize, const P: usize> Arm<T, N, P> for Chain<T, N> {
     }
 
     fn energy_regressor(&self, q: &SVector<T, N>, dq: &SVector<T, N>) -> SVector<T, P> {
-        let rows = self.links_energy_regressor(&(*q).into(), &(*dq).into());
-        let rotors = dq.iter().map(|dq| lit::<T>(0.5) * *dq * *dq);
+        self.energy_regressor_on::<Portable>(q, dq)
+    }
+
+    #[inline(always)]
+    fn energy_regressor_on<C: Cpu>(&self, q: &SVector<T, N>, dq: &SVector<T, N>) -> SVector<T, P> {
+        check::<N, P>();
+        let (q, dq) = (&q.data.0[0], &dq.data.0[0]);
+        let sincos = sines_cosines_of_many::<C, T, N>(&self.angles_of(q));
         let mut energy = SVector::<T, P>::zeros();
-        for (entry, value) in energy.iter_mut().zip(rows.into_iter().flatten().chain(rotors)) {
-            *entry = value;
+        // One lane, whose products and sums are those of the processor `C`.
+        let one = |x: T| Lanes::<T, C, 1>::of(x);
+        let state = |j: usize| {
+            let SinCos { sine, cosine } = sincos[j];
+            (SinCos { sine: one(sine), cosine: one(cosine) }, one(q[j]), one(dq[j]))
+        };
+        self.link_energies(state, |k, row| {
+            if let Some(entries) = energy.data.0[0].as_chunks_mut().0.get_mut(k) {
+                *entries = row.map(|x| x.0[0]);
+            }
+        });
+        for j in 0..N {
+            if let Some(entry) = energy.data.0[0].get_mut(first_rotor(N) + j) {
+                *entry = lit::<T>(0.5) * dq[j] * dq[j];
+            }
         }
         energy
+    }
+
+    #[inline(always)]
+    fn energy_regressors_on<C: Cpu>(&self, states: [[&SVector<T, N>; 2]; 2]) -> [SVector<T, P>; 2] {
+        check::<N, P>();
+        let [[qa, va], [qb, vb]] = states.map(|state| state.map(|x| &x.data.0[0]));
+        let a = sines_cosines_of_many::<C, T, N>(&self.angles_of(qa));
+        let b = sines_cosines_of_many::<C, T, N>(&self.angles_of(qb));
+        let pair = |x: T, y: T| Lanes::<T, C, 2>::new([x, y]);
+        let state = |j: usize| {
+            let angle = SinCos { sine: pair(a[j].sine, b[j].sine), cosine: pair(a[j].cosine, b[j].cosine) };
+            (angle, pair(qa[j], qb[j]), pair(va[j], vb[j]))
+        };
+        let mut energies = [SVector::<T, P>::zeros(); 2];
+        self.link_energies(state, |k, row| {
+            for l in 0..2 {
+                if let Some(entries) = energies[l].data.0[0].as_chunks_mut().0.get_mut(k) {
+                    *entries = row.map(|x| x.0[l]);
+                }
+            }
+        });
+        for (energy, dq) in energies.iter_mut().zip([va, vb]) {
+            for j in 0..N {
+                if let Some(entry) = energy.data.0[0].get_mut(first_rotor(N) + j) {
+                    *entry = lit::<T>(0.5) * dq[j] * dq[j];
+                }
+            }
+        }
+        energies
     }
 
     fn momentum_regressor(&self, q: &SVector<T, N>, dq: &SVector<T, N>) -> SMatrix<T, N, P> {
@@ -181,6 +262,23 @@ impl<T: Real, const N: usize, const P: usize> Arm<T, N, P> for Chain<T, N> {
         });
         put_rotors(&mut momentum, dq);
         (momentum, potential)
+    }
+
+    #[inline(always)]
+    fn momentum_columns<C: Cpu>(
+        &self,
+        q: &SVector<T, N>,
+        dq: &SVector<T, N>,
+        sink: &mut impl MomentumColumns<T, N>,
+    ) {
+        check::<N, P>();
+        if N <= 4 {
+            self.momentum_columns_by::<C, 4>(&q.data.0[0], &dq.data.0[0], sink);
+        } else if N <= 8 {
+            self.momentum_columns_by::<C, 8>(&q.data.0[0], &dq.data.0[0], sink);
+        } else {
+            self.momentum_columns_by::<C, N>(&q.data.0[0], &dq.data.0[0], sink);
+        }
     }
 
     fn regressor(&self, q: &SVector<T, N>, dq: &SVector<T, N>, ddq: &SVector<T, N>) -> SMatrix<T, N, P> {

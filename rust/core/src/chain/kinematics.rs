@@ -31,7 +31,7 @@ pub(super) struct JointConstants<T> {
     cosine: Matrix3<T>,
     sine: Matrix3<T>,
     /// Unit vector along the joint axis in the parent link's frame.
-    axis: Vector3<T>,
+    pub(super) axis: Vector3<T>,
 }
 
 impl<T: Real> JointConstants<T> {
@@ -52,6 +52,24 @@ impl<T: Real> JointConstants<T> {
             sine[i] = cross(&r[i], a);
         }
         Self { fixed, cosine, sine, axis }
+    }
+}
+
+impl<T: Real> JointConstants<T> {
+    /// Rotation from the link frame into that of the parent link at the joint angle with this sine and cosine.
+    #[inline(always)]
+    pub(super) fn rotation<V: Number<Real = T>>(&self, kind: JointKind, angle: &SinCos<V>) -> Matrix3<V> {
+        let mut rotation = [[zero(); 3]; 3];
+        for i in 0..3 {
+            rotation[i] = of(&self.fixed[i]);
+            if kind == JointKind::Revolute {
+                for k in 0..3 {
+                    let turned = V::of(self.cosine[i][k]).fused(angle.cosine, rotation[i][k]);
+                    rotation[i][k] = V::of(self.sine[i][k]).fused(angle.sine, turned);
+                }
+            }
+        }
+        rotation
     }
 }
 
@@ -90,16 +108,7 @@ impl<T: Real, const N: usize> Chain<T, N> {
         let mut parent: Option<(Matrix3<V>, Vector3<V>)> = None;
         for j in 0..N {
             let (joint, constants) = (&self.joints[j], &self.constants[j]);
-            let mut local = [[zero(); 3]; 3];
-            for i in 0..3 {
-                local[i] = of(&constants.fixed[i]);
-                if joint.kind == JointKind::Revolute {
-                    for k in 0..3 {
-                        let turned = V::of(constants.cosine[i][k]).fused(sincos[j].cosine, local[i][k]);
-                        local[i][k] = V::of(constants.sine[i][k]).fused(sincos[j].sine, turned);
-                    }
-                }
-            }
+            let local = constants.rotation(joint.kind, &sincos[j]);
             let (mut rotation, mut position, mut axis) = (local, of(&joint.translation), of(&constants.axis));
             if let Some((turn, origin)) = &parent {
                 rotation = product(turn, &local);

@@ -5,12 +5,15 @@
 //! `m` mass, `h` first and `I` second moments (Siciliano 2009, section 7.2). A torque row is the power of this force and moment along the motion
 //! subspace of a joint.
 
-use super::Chain;
 use super::inertia::LinkInertia;
 use super::kinematics::LinkPose;
-use super::vector::{Twist, Vector3, add, cross, cross_plus, dot, of, subtract, turned_back, zero};
+use super::vector::{
+    Matrix3, Twist, Vector3, add, cross, cross_plus, dot, of, scaled_plus, subtract, turned_back, zero,
+};
+use super::{Chain, JointKind};
 use crate::number::Number;
 use crate::real::{Real, lit};
+use crate::trig::SinCos;
 
 impl<T: Real, const N: usize> Chain<T, N> {
     /// Torque regressor at a motion `[q, dq, ddq]`: calls `put(i, k, row)` for every joint `i` and link `k >= i`, such that the sum over `k` of `row
@@ -75,6 +78,48 @@ impl<T: Real, const N: usize> Chain<T, N> {
         }
     }
 
+    /// The same regressors, column by column, with joints side by side in lanes; `units[k]` is one in the lane of joint `k`, else zero. Calls
+    /// `put(k, momentum, potential)` for every link `k` with ten columns of each.
+    ///
+    /// The joints' motion subspaces and their rates go from link to link in the axes of each.
+    #[inline(always)]
+    pub(super) fn momentum_columns<V: Number<Real = T>>(
+        &self,
+        sincos: &[SinCos<T>; N],
+        [q, dq]: [&[T; N]; 2],
+        units: &[V; N],
+        mut put: impl FnMut(usize, LinkInertia<V>, LinkInertia<V>),
+    ) {
+        let (mut joints, mut rates, mut velocity) = (Twist::zero(), Twist::zero(), Twist::zero());
+        let mut gravity = of::<V>(&self.gravity);
+        for k in 0..N {
+            let (joint, constants) = (&self.joints[k], &self.constants[k]);
+            let angle = SinCos { sine: V::of(sincos[k].sine), cosine: V::of(sincos[k].cosine) };
+            let rotation = constants.rotation(joint.kind, &angle);
+            let (mut step, axis) = (of(&joint.translation), of(&joint.axis));
+            if joint.kind == JointKind::Prismatic {
+                step = scaled_plus(V::of(q[k]), &of(&constants.axis), &step);
+            }
+            let outwards = (&rotation, &step);
+            let own = match joint.kind {
+                JointKind::Revolute => Twist { angular: axis, linear: [zero(); 3] },
+                JointKind::Prismatic => Twist { angular: [zero(); 3], linear: axis },
+            };
+            velocity = own.scaled_plus(V::of(dq[k]), &in_next(&velocity, outwards));
+            joints = own.scaled_plus(units[k], &in_next(&joints, outwards));
+            rates = velocity.cross(&own).scaled_plus(units[k], &in_next(&rates, outwards));
+            gravity = turned_back(&rotation, &gravity);
+            let momentum = momentum_row(&joints, &velocity);
+            let mut potential = momentum_row(&rates, &velocity).map(|x| -x);
+            let weight = cross(&gravity, &joints.angular);
+            potential[0] = potential[0] - dot(&gravity, &joints.linear);
+            for c in 0..3 {
+                potential[1 + c] = potential[1 + c] - weight[c];
+            }
+            put(k, momentum, potential);
+        }
+    }
+
     /// Regressor of the links' kinetic and potential energy, J, zero at rest at `q = 0`: row `k` times `links[k]`, summed over all links.
     #[inline(always)]
     pub fn links_energy_regressor<V: Number<Real = T>>(
@@ -82,30 +127,60 @@ impl<T: Real, const N: usize> Chain<T, N> {
         q: &[V; N],
         dq: &[V; N],
     ) -> [LinkInertia<V>; N] {
-        let poses = self.poses(q);
-        let motions = self.motions(&poses, dq, None);
-        let (gravity, half) = (of::<V>(&self.gravity), V::of(lit(0.5)));
-        let mut rows = [[zero(); 10]; N];
-        for k in 0..N {
-            let Twist { angular: w, linear: v } = in_link(&motions[k].velocity, &poses[k]);
-            let (height, turned_gravity) = &self.reference[k];
-            let rise = V::of(*height) - dot(&gravity, &poses[k].position);
-            let fall = subtract(&of(turned_gravity), &turned_back(&poses[k].rotation, &gravity));
-            let [hx, hy, hz] = cross_plus(&v, &w, &fall);
-            rows[k] = [
-                half.fused(dot(&v, &v), rise),
-                hx,
-                hy,
-                hz,
-                half * w[0] * w[0],
-                w[0] * w[1],
-                half * w[1] * w[1],
-                w[0] * w[2],
-                w[1] * w[2],
-                half * w[2] * w[2],
-            ];
-        }
+        let (angles, mut rows) = (self.angles_of(q), [[zero(); 10]; N]);
+        self.link_energies(|j| (SinCos::of(angles[j]), q[j], dq[j]), |k, row| rows[k] = row);
         rows
+    }
+
+    /// Rows of [`Self::links_energy_regressor`], given sine and cosine of the angle ([`Self::angles_of`]), position and velocity of every
+    /// joint as `state(j)`: calls `put(k, row)` for every link `k`.
+    ///
+    /// Energies need no vectors of several links in one frame, so velocity and gravity go from link to link in the axes of each (Luh, Walker and Paul
+    /// 1980).
+    #[inline(always)]
+    pub(super) fn link_energies<V: Number<Real = T>>(
+        &self,
+        state: impl Fn(usize) -> (SinCos<V>, V, V),
+        mut put: impl FnMut(usize, LinkInertia<V>),
+    ) {
+        let half = V::of(lit(0.5));
+        let (mut w, mut v, mut gravity) = ([zero(); 3], [zero(); 3], of::<V>(&self.gravity));
+        // Scalar product of gravity and the position of the link frame's origin, m^2/s^2.
+        let mut along = zero();
+        for k in 0..N {
+            let (joint, constants) = (&self.joints[k], &self.constants[k]);
+            let (angle, position, rate) = state(k);
+            let rotation = constants.rotation(joint.kind, &angle);
+            let (mut step, axis) = (of(&joint.translation), of(&joint.axis));
+            if joint.kind == JointKind::Prismatic {
+                step = scaled_plus(position, &of(&constants.axis), &step);
+            }
+            along = along + dot(&gravity, &step);
+            v = turned_back(&rotation, &cross_plus(&w, &step, &v));
+            w = turned_back(&rotation, &w);
+            gravity = turned_back(&rotation, &gravity);
+            match joint.kind {
+                JointKind::Revolute => w = scaled_plus(rate, &axis, &w),
+                JointKind::Prismatic => v = scaled_plus(rate, &axis, &v),
+            }
+            let (height, turned_gravity) = &self.reference[k];
+            let [hx, hy, hz] = cross_plus(&v, &w, &subtract(&of(turned_gravity), &gravity));
+            put(
+                k,
+                [
+                    half.fused(dot(&v, &v), V::of(*height) - along),
+                    hx,
+                    hy,
+                    hz,
+                    half * w[0] * w[0],
+                    w[0] * w[1],
+                    half * w[1] * w[1],
+                    w[0] * w[2],
+                    w[1] * w[2],
+                    half * w[2] * w[2],
+                ],
+            );
+        }
     }
 }
 
@@ -116,6 +191,16 @@ fn in_link<V: Number>(motion: &Twist<V>, pose: &LinkPose<V>) -> Twist<V> {
     Twist {
         angular: turned_back(&pose.rotation, &motion.angular),
         linear: turned_back(&pose.rotation, &at_origin),
+    }
+}
+
+/// Spatial motion vector at the origin of a link's frame in the axes of the link, from `motion` in the frame of its parent link, in which the link's
+/// frame has the orientation `rotation` and the origin `step`.
+#[inline(always)]
+fn in_next<V: Number>(motion: &Twist<V>, (rotation, step): (&Matrix3<V>, &Vector3<V>)) -> Twist<V> {
+    Twist {
+        angular: turned_back(rotation, &motion.angular),
+        linear: turned_back(rotation, &cross_plus(&motion.angular, step, &motion.linear)),
     }
 }
 

@@ -57,23 +57,25 @@ impl<T: Real, const N: usize, const P: usize> FilteredPower<T, N, P> {
         interval: &SampleInterval<T, N>,
         tau: &SVector<T, N>,
     ) -> ([[T; R]; 1], [T; 1]) {
-        let energy = arm.energy_regressor_on::<C>(&now.q, &now.dq);
         let mut whole = SMatrix::zeros();
-        match variant {
-            Variant::Paper => self.paper::<C, A>(&energy, interval, &mut whole),
-            Variant::Exact => self.exact::<C, A>(arm, &energy, now, interval, &mut whole),
-        }
+        let energy = match variant {
+            Variant::Paper => self.paper::<C, A>(arm, now, interval, &mut whole),
+            Variant::Exact => self.exact::<C, A>(arm, now, interval, &mut whole),
+        };
         (self.last, self.last_energy, self.last_supply) = (*now, energy, tau.dot(&now.dq));
         columns.rows(&whole, A::INERTIAL, &self.friction, &SVector::from([self.supply]))
     }
 
+    /// Writes the inertial part of the regressor row into `whole`, and returns the energy regressor at the state `now`.
     #[inline(always)]
     fn paper<C: Cpu, A: Arm<T, N, P>>(
         &mut self,
-        energy: &SVector<T, P>,
+        arm: &A,
+        now: &Snapshot<T, N>,
         interval: &SampleInterval<T, N>,
         whole: &mut SMatrix<T, 1, P>,
-    ) {
+    ) -> SVector<T, P> {
+        let energy = arm.energy_regressor_on::<C>(&now.q, &now.dq);
         let step = self.steps.whole(interval.h);
         for j in 0..A::INERTIAL {
             self.energy[j] = step.paper_derivative::<C>(self.energy[j], self.last_energy[j], energy[j]);
@@ -81,20 +83,22 @@ impl<T: Real, const N: usize, const P: usize> FilteredPower<T, N, P> {
         }
         self.friction.hold_powers::<C>(&step, &self.last.dq);
         self.supply = step.held::<C>(self.supply, self.last_supply);
+        energy
     }
 
+    /// Writes the inertial part of the regressor row into `whole`, and returns the energy regressor at the state `now`.
     #[inline(always)]
     fn exact<C: Cpu, A: Arm<T, N, P>>(
         &mut self,
         arm: &A,
-        energy: &SVector<T, P>,
         now: &Snapshot<T, N>,
         interval: &SampleInterval<T, N>,
         whole: &mut SMatrix<T, 1, P>,
-    ) {
+    ) -> SVector<T, P> {
         let step = self.steps.whole(interval.h);
         let half_way = self.last.half_way(now, interval.h);
-        let middle = arm.energy_regressor_on::<C>(&half_way.q, &half_way.dq);
+        let [energy, middle] =
+            arm.energy_regressors_on::<C>([[&now.q, &now.dq], [&half_way.q, &half_way.dq]]);
         for j in 0..A::INERTIAL {
             let height = middle[j] - (energy[j] + self.last_energy[j]) * lit(0.5);
             self.energy[j] = step.curve::<C>(self.energy[j], self.last_energy[j], energy[j], height);
@@ -102,6 +106,7 @@ impl<T: Real, const N: usize, const P: usize> FilteredPower<T, N, P> {
         }
         self.friction.filter_powers::<C>(&step, &self.last.dq, &now.dq);
         self.supply = self.exact_supply::<C>(now, interval);
+        energy
     }
 
     /// Output of the low-pass filter `F`, W, for the power of torques held in each part of the interval, with velocities linear over the whole.
