@@ -61,8 +61,10 @@ fn times_blocks<C: Cpu, T: Real, const W: usize, const M: usize, const R: usize>
             add_column::<C, T, W, M, R>(&mut even, p, psi, c, j);
         }
         for m in 0..M {
-            for l in 0..W {
-                product[m][c * W + l] = even[m][l] + odd[m][l];
+            if let Some(block) = product[m].as_chunks_mut::<W>().0.get_mut(c) {
+                for l in 0..W {
+                    block[l] = even[m][l] + odd[m][l];
+                }
             }
         }
     }
@@ -78,9 +80,10 @@ fn add_column<C: Cpu, T: Real, const W: usize, const M: usize, const R: usize>(
     c: usize,
     j: usize,
 ) {
+    let Some(block) = p[j].as_chunks::<W>().0.get(c) else { return };
     for m in 0..M {
         for l in 0..W {
-            sums[m][l] = C::fused(p[j][c * W + l], psi[m][j], sums[m][l]);
+            sums[m][l] = C::fused(block[l], psi[m][j], sums[m][l]);
         }
     }
 }
@@ -105,9 +108,10 @@ pub(super) fn products<C: Cpu, T: Real, const M: usize, const R: usize>(
 #[inline(always)]
 pub(super) fn dot<C: Cpu, T: Real, const R: usize>(a: &[T; R], b: &[T; R], r: usize) -> T {
     let mut sums = [T::zero(); EIGHT];
-    for c in 0..r / EIGHT {
+    let blocks = a.as_chunks::<EIGHT>().0.iter().zip(b.as_chunks::<EIGHT>().0);
+    for (a, b) in blocks.take(r / EIGHT) {
         for l in 0..EIGHT {
-            sums[l] = C::fused(a[c * EIGHT + l], b[c * EIGHT + l], sums[l]);
+            sums[l] = C::fused(a[l], b[l], sums[l]);
         }
     }
     let mut rest = T::zero();
