@@ -12,7 +12,7 @@ use crate::serial::term::TermKind;
 use crate::serial::weak_form::rows::{Estimate, JointRows, Regression, Rows, Signal};
 
 /// Share of a cost from which [`JointCosts::likelihood`] is linear.
-const NEARLY_ALL: f64 = 0.95;
+const LINEAR_FROM: f64 = 0.95;
 
 /// Evidence for a term: comparison of the model with the term and the model without it.
 #[derive(Debug, Clone, Copy)]
@@ -146,7 +146,7 @@ impl JointCosts {
     }
 
     /// Twice the logarithm of the likelihood ratio that a decrease `gain` of the cost of the `joints` (from 0), taken together, promises:
-    /// `-n log(1 - gain / before)`, linear from [`NEARLY_ALL`] of the cost on, as first-order tests may promise more than there is.
+    /// `-n log(1 - gain / before)`, linear from [`LINEAR_FROM`] of the cost on, as first-order tests may promise more than there is.
     pub(in crate::serial) fn likelihood(&self, gain: f64, joints: impl Iterator<Item = usize>) -> f64 {
         let (before, n) = joints
             .map(|j| (self.before[j], self.independent[j]))
@@ -158,7 +158,7 @@ impl JointCosts {
         n * if share <= 0.0 {
             share
         } else {
-            (share - NEARLY_ALL).max(0.0) - (1.0 - share.min(NEARLY_ALL)).ln()
+            (share - LINEAR_FROM).max(0.0) - (1.0 - share.min(LINEAR_FROM)).ln()
         }
     }
 }
