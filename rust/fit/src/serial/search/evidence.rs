@@ -9,9 +9,9 @@ use crate::serial::search::Search;
 use crate::serial::search::fitting::Fitted;
 use crate::serial::search::tables::table_price;
 use crate::serial::term::TermKind;
-use crate::serial::weak_form::rows::{Estimate, JointRows, Regression, Rows, Signal};
+use crate::serial::weak_form::rows::{JointRows, Regression, Rows, Signal};
 
-/// Share of a cost from which [`JointCosts::likelihood`] is linear.
+/// Share of a cost from which [`likelihood_gain`] is linear.
 const LINEAR_FROM: f64 = 0.95;
 
 /// Evidence for a term: comparison of the model with the term and the model without it.
@@ -127,39 +127,15 @@ impl Search<'_> {
     }
 }
 
-/// Costs (weighted squared residuals) of the joints on the training logs under a model, at least those of the position noise, and numbers of
-/// independent rows.
-pub(in crate::serial) struct JointCosts {
-    before: Vec<f64>,
-    independent: Vec<f64>,
-}
-
-impl JointCosts {
-    /// Costs under the model `at` along the logs of `rows`.
-    pub(in crate::serial) fn of(regression: &Regression, rows: &Rows, at: &Estimate) -> Self {
-        let floor = floor(rows, &regression.weights);
-        let cost = |(j, r): (usize, &Vec<f64>)| {
-            (regression.weights[j] * r.iter().map(|r| r * r).sum::<f64>()).max(floor[j])
-        };
-        let before = at.residual.iter().enumerate().map(cost).collect();
-        Self { before, independent: rows.independent_rows(&at.residual) }
-    }
-
-    /// Twice the logarithm of the likelihood ratio that a decrease `gain` of the cost of the `joints` (from 0), taken together, promises:
-    /// `-n log(1 - gain / before)`, linear from [`LINEAR_FROM`] of the cost on, as first-order tests may promise more than there is.
-    pub(in crate::serial) fn likelihood(&self, gain: f64, joints: impl Iterator<Item = usize>) -> f64 {
-        let (before, n) = joints
-            .map(|j| (self.before[j], self.independent[j]))
-            .fold((0.0, 0.0), |(cost, rows), (own, more)| (cost + own, rows + more));
-        let share = gain / before;
-        if !share.is_finite() {
-            return gain;
-        }
-        n * if share <= 0.0 {
-            share
-        } else {
-            (share - LINEAR_FROM).max(0.0) - (1.0 - share.min(LINEAR_FROM)).ln()
-        }
+/// Twice the logarithm of a likelihood ratio, by the decrease `gain` of a cost (weighted squared residuals) that is `before`, where the weights were
+/// made for residuals as large as before: `-before log(1 - gain / before)`, linear from [`LINEAR_FROM`] of the cost on, as first-order tests may
+/// promise more than there is.
+pub(in crate::serial) fn likelihood_gain(gain: f64, before: f64) -> f64 {
+    let most = LINEAR_FROM * before;
+    if gain <= 0.0 || most <= 0.0 {
+        gain
+    } else {
+        (gain - most).max(0.0) - before * (1.0 - gain.min(most) / before).ln()
     }
 }
 
@@ -261,6 +237,7 @@ pub(in crate::serial) fn trust(without: &Fitted, with: &Fitted, evidence: &Evide
 mod tests {
     use super::*;
     use crate::numeric::random::Random;
+    use crate::serial::weak_form::rows::Estimate;
 
     const ROWS: usize = 240;
 
@@ -295,16 +272,11 @@ mod tests {
 
     #[test]
     fn small_gains_count_as_they_are_and_large_ones_by_the_likelihood() {
-        let of = |gain: f64, before: f64, n: f64| {
-            JointCosts { before: vec![1.0, before], independent: vec![1.0, n] }
-                .likelihood(gain, std::iter::once(1))
-        };
-        assert!((of(1.0, 1e4, 1e4) - 1.0).abs() < 1e-3);
-        assert!((of(9.0, 10.0, 10.0) - 10.0 * 10.0_f64.ln()).abs() < 1e-12);
-        // Weights made for the residuals of a better model make the cost, and not the number of rows, larger.
-        assert!((of(60.0, 2000.0, 100.0) + 100.0 * 0.97_f64.ln()).abs() < 1e-9);
-        assert!(of(12.0, 10.0, 10.0) > of(9.6, 10.0, 10.0) && of(12.0, 10.0, 10.0).is_finite());
-        assert_eq!((of(-3.0, 10.0, 10.0), of(2.0, 0.0, 0.0)), (-3.0, 2.0));
+        assert!((likelihood_gain(1.0, 1e4) - 1.0).abs() < 1e-3);
+        assert!((likelihood_gain(9.0, 10.0) - 10.0 * 10.0_f64.ln()).abs() < 1e-12);
+        assert!(likelihood_gain(12.0, 10.0) > likelihood_gain(9.6, 10.0));
+        assert!(likelihood_gain(12.0, 10.0).is_finite());
+        assert_eq!((likelihood_gain(-3.0, 10.0), likelihood_gain(2.0, 0.0)), (-3.0, 2.0));
     }
 
     #[test]

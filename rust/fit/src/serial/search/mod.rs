@@ -129,7 +129,7 @@ impl Search<'_> {
 
     /// The term whose addition gives the accepted model of least [`Fitted::total`]; `None` where no candidate is accepted.
     fn best_addition(&self, guesses: &[Vec<Guess>], regression: &Regression, model: &Fitted) -> Option<Term> {
-        let screened = self.screened(guesses, regression, model);
+        let screened = self.screened_by_likelihood(guesses, regression, model);
         let single = self.finalists(regression, model, &screened);
         let last = model.terms.len();
         let accepted =

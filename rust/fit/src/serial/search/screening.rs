@@ -3,7 +3,7 @@
 use crate::progress::Phase;
 use crate::serial::constants::{PRICE, TERM_FINALISTS};
 use crate::serial::search::Search;
-use crate::serial::search::evidence::JointCosts;
+use crate::serial::search::evidence::likelihood_gain;
 use crate::serial::search::fitting::{Fitted, difference};
 use crate::serial::term::row_term::{RowLaw, RowTerm};
 use crate::serial::term::{Term, TermKind};
@@ -188,31 +188,51 @@ impl Search<'_> {
         self.training.signal(&term.with(p), theta)
     }
 
-    /// Candidates that are not in the model, each with the values of its best first-order test and twice the logarithm of the likelihood ratio that the
-    /// test promises ([`JointCosts::likelihood`]), largest first.
+    /// Candidates that are not in the model, each with the values and the decrease of the cost of its best first-order test, largest decrease first.
+    /// The cost counts at the noise that the weights of `regression` are made for.
     pub(in crate::serial) fn screened(
         &self,
         guesses: &[Vec<Guess>],
         regression: &Regression,
         model: &Fitted,
     ) -> Vec<(Term, f64)> {
+        self.screened_by(guesses, regression, model, |_, gain| gain)
+    }
+
+    /// Candidates as of [`Self::screened`], each with twice the logarithm of the likelihood ratio that its best first-order test promises
+    /// ([`likelihood_gain`]), largest first; the weights of `regression` are made for the residuals of `model`.
+    pub(in crate::serial) fn screened_by_likelihood(
+        &self,
+        guesses: &[Vec<Guess>],
+        regression: &Regression,
+        model: &Fitted,
+    ) -> Vec<(Term, f64)> {
+        let costs: Vec<f64> = model.costs[0].iter().map(|joint| joint.iter().sum()).collect();
+        self.screened_by(guesses, regression, model, |guess, gain| {
+            let acts_on = (0..costs.len()).filter(|j| guess.columns.iter().any(|c| c[*j].is_some()));
+            likelihood_gain(gain, acts_on.map(|j| costs[j]).sum())
+        })
+    }
+
+    fn screened_by(
+        &self,
+        guesses: &[Vec<Guess>],
+        regression: &Regression,
+        model: &Fitted,
+        worth: impl Fn(&Guess, f64) -> f64 + Sync,
+    ) -> Vec<(Term, f64)> {
         let open: Vec<&Vec<Guess>> = guesses
             .iter()
             .filter(|group| !model.terms.iter().any(|t| group.first().is_some_and(|g| g.term.same_place(t))))
             .collect();
         self.progress.begin(Phase::Screen, open.len());
-        let costs = JointCosts::of(regression, self.training.rows(), &model.estimate);
-        let likelihood = |guess: &Guess, gain: f64| {
-            let joints = 0..self.rotary.len();
-            costs.likelihood(gain, joints.filter(|j| guess.columns.iter().any(|c| c[*j].is_some())))
-        };
         let mut found: Vec<(Term, f64)> = open
             .par_iter()
             .filter_map(|group| {
                 self.progress.unit();
                 let tests = group.iter().filter_map(|guess| {
                     let (term, gain) = self.test(regression, &model.estimate, guess)?;
-                    Some((term, likelihood(guess, gain)))
+                    Some((term, worth(guess, gain)))
                 });
                 tests.max_by(|a, b| a.1.total_cmp(&b.1))
             })

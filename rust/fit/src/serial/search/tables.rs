@@ -10,7 +10,7 @@ use crate::locate::variable_classes::CLASSES;
 use crate::result::verdict::ABOVE_NOISE;
 use crate::serial::constants::{MOST_TABLES, PRICE, RIVAL_FINALISTS};
 use crate::serial::search::Search;
-use crate::serial::search::evidence::JointCosts;
+use crate::serial::search::evidence::likelihood_gain;
 use crate::serial::search::fitting::Fitted;
 use crate::serial::term::table::Table;
 use crate::serial::term::{Term, TermKind};
@@ -79,8 +79,8 @@ impl Search<'_> {
         } else {
             score.gain
         };
-        let costs = JointCosts::of(regression, self.training.rows(), at);
-        let excess = costs.likelihood(gain, std::iter::once(joint)) - table_price(&term);
+        let before = regression.weights[joint] * at.residual[joint].iter().map(|r| r * r).sum::<f64>();
+        let excess = likelihood_gain(gain, before) - table_price(&term);
         Some((term, excess))
     }
 
