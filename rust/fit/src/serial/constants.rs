@@ -34,10 +34,6 @@ pub const RESTORES: f64 = 14.0;
 /// these values, see [`RESTORES`].
 pub const RESTORES_EACH: f64 = 1.5;
 
-/// Smallest standard deviation of a spring's torque along the training logs, relative to the torque's RMS, at which the spring is accepted: below, its
-/// rest position lies far outside the motion, and any constant torque would do.
-pub const SPRING_VARIES: f64 = 0.1;
-
 /// Prior standard deviation of the inertial parameters of a link whose nominal values are tested as wrong, as a multiple of the arm file's standard
 /// deviation: wide, and yet narrow enough to hold the parameters that motion does not determine near the arm file's values.
 pub const LOOSE: f64 = 10.0;

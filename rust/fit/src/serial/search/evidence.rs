@@ -2,8 +2,7 @@
 
 use crate::numeric::random::Random;
 use crate::serial::constants::{
-    CONSEQUENCE, HOLDOUT_DEVIATIONS, MATTERS, NOTICED, PRICE, RESAMPLES, RESTORES, RESTORES_EACH,
-    SIGNIFICANT, SPRING_VARIES,
+    CONSEQUENCE, HOLDOUT_DEVIATIONS, MATTERS, NOTICED, PRICE, RESAMPLES, RESTORES, RESTORES_EACH, SIGNIFICANT,
 };
 use crate::serial::search::Search;
 use crate::serial::search::fitting::Fitted;
@@ -37,8 +36,6 @@ pub struct Evidence {
     pub share: f64,
     /// RMS torque of the term relative to the RMS torque of the joint, for the joint with the largest ratio.
     pub consequence: f64,
-    /// Whether the term is a spring whose torque hardly varies ([`SPRING_VARIES`]), which nothing tells from a constant torque.
-    pub is_preload: bool,
 }
 
 impl Evidence {
@@ -63,7 +60,7 @@ impl Evidence {
 
     /// Whether the term is accepted, for what it explains or for the arm file's values that it restores.
     pub fn is_accepted(&self) -> bool {
-        !self.is_preload && (self.explains() || self.restores())
+        self.explains() || self.restores()
     }
 }
 
@@ -109,7 +106,6 @@ impl Search<'_> {
             deviations: confirmed(&acts_on, &regression.weights, self.holdout.rows(), [without, with]),
             share,
             consequence: consequence(self.training.rows(), &signal),
-            is_preload: term.is_spring() && !varies(&signal),
         }
     }
 
@@ -176,15 +172,6 @@ pub(in crate::serial) fn consequence(rows: &Rows, signal: &Signal) -> f64 {
         _ => 0.0,
     };
     rows.joints.iter().zip(signal).map(of).fold(0.0, f64::max)
-}
-
-/// Whether the torque of `signal` varies along the logs on some joint, by more than [`SPRING_VARIES`] of its RMS.
-fn varies(signal: &Signal) -> bool {
-    signal.iter().flatten().any(|torque| {
-        let mean = |of: &dyn Fn(f64) -> f64| torque.iter().map(|x| of(*x)).sum::<f64>() / torque.len() as f64;
-        let square = mean(&|x| x * x);
-        square - mean(&|x| x).powi(2) > SPRING_VARIES * SPRING_VARIES * square
-    })
 }
 
 /// Share of resamples of the blocks of training logs and holdout in which the cost of a model, plus two per effective parameter, is below that of
@@ -261,13 +248,6 @@ mod tests {
         };
         let rows = Rows { joints: vec![joint], parameters: 0, blocks: ROWS / 20, independent: 10 };
         confirmed(&[0], &[1.0], &rows, [&without, &with])
-    }
-
-    #[test]
-    fn a_spring_far_outside_the_motion_is_a_constant_torque() {
-        let torque = |rest: f64| vec![None, Some((0..ROWS).map(|k| (0.1 * k as f64).sin() - rest).collect())];
-        assert!(varies(&torque(3.0)));
-        assert!(!varies(&torque(20.0)));
     }
 
     #[test]

@@ -327,6 +327,22 @@ mod tests {
     }
 
     #[test]
+    fn rivals_of_a_cause_are_screened_by_the_cost_that_they_explain() {
+        let cause = offset(0, 0.6);
+        let (training, prior, progress) = (Sines::with(std::slice::from_ref(&cause), 1), prior(), progress());
+        let search = search(&training, &training, &prior, vec![vec![offset(0, 0.05)]], &progress);
+        let regression =
+            Regression::reweighted(training.rows(), &prior, &training.signal(&cause, &prior.theta));
+        let without = search.fit(&regression, Vec::new(), &prior.theta);
+        let guesses = search.guesses(&regression, &without.estimate);
+        let (term, gain) = search.screened(&guesses, &regression, &without).remove(0);
+        let with = search.fit(&regression, vec![term], &without.estimate.theta);
+        assert!((gain / (without.estimate.cost - with.estimate.cost) - 1.0).abs() < 1e-3, "{gain}");
+        // At these weights the cost is far above the number of rows, which any likelihood ratio with re-estimated noise follows.
+        assert!(gain > 10.0 * ROWS as f64);
+    }
+
+    #[test]
     fn nothing_is_found_where_nothing_is_missing() {
         assert!(names(&found(&[], 4)).is_empty());
     }
@@ -455,7 +471,6 @@ mod tests {
             deviations: 5.0,
             share: 0.5,
             consequence: 0.1,
-            is_preload: false,
         };
         assert!(good.is_accepted());
         for weak in [
@@ -465,7 +480,6 @@ mod tests {
             Evidence { deviations: 1.0, ..good },
             Evidence { share: 0.05, ..good },
             Evidence { consequence: 1e-3, ..good },
-            Evidence { is_preload: true, ..good },
         ] {
             assert!(!weak.is_accepted(), "{weak:?}");
         }

@@ -293,18 +293,6 @@ impl Term {
         spec.hooks.command && spec.parameters.iter().all(|p| p.quantity == Quantity::Ratio)
     }
 
-    /// Whether the term is a spring, with a rest position.
-    pub fn is_spring(&self) -> bool {
-        match &self.kind {
-            TermKind::Joints(of) => of.members[0].is_spring(),
-            TermKind::Row(row) => row.law == RowLaw::Spring,
-            TermKind::Law(effect) => {
-                effect.law.spec().parameters.iter().any(|p| p.quantity == Quantity::Rest)
-            }
-            _ => false,
-        }
-    }
-
     /// Whether the term is a delay or lag of the command or the reference: all of its parameters are times.
     pub fn is_delay(&self) -> bool {
         if let TermKind::Joints(of) = &self.kind {
