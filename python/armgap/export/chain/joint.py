@@ -36,7 +36,8 @@ class Joint:
     reading : float
         Encoder reading at ``q = 0`` [rad or m].
     stop : (position, stiffness), optional
-        Position [rad or m] beyond which, on the side away from zero, a spring acts, and its stiffness [N m/rad or N/m].
+        Position [rad or m] beyond which a spring acts, and its stiffness [N m/rad or N/m]; the spring acts on the side away from zero, or
+        towards zero where the stiffness is negative.
     """
 
     viscous: float
@@ -67,7 +68,8 @@ class Joint:
             return None
         position, stiffness = self.stop
         edge = position + self.reading
-        return (-far, edge, stiffness) if position >= 0 else (edge, far, stiffness)
+        towards_larger = (position >= 0) == (stiffness >= 0)
+        return (-far, edge, abs(stiffness)) if towards_larger else (edge, far, abs(stiffness))
 
 
 def _spring(joint: Joint, p: Mapping[str, float]) -> Joint:

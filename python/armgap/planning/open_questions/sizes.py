@@ -221,16 +221,11 @@ def levels(effect: str, joint: int | None, scales: Scales) -> list[dict[str, flo
         return [{"level": float(x)} for x in np.geomspace(least, most, _THRESHOLD_VALUES + 2)[1:-1]]
     stiffness = CONTACT_STIFFNESS * float(scales.torque[j] / scales.position[j])
     damping = CONTACT_DAMPING * float(scales.torque[j] / scales.speed[j])
-    # The side of a contact is the sign of its position.
-    ends = (
-        (max(float(scales.seen_high[j]), 0.0), float(scales.high[j])),
-        (min(float(scales.seen_low[j]), 0.0), float(scales.low[j])),
-    )
+    parts = (np.arange(_THRESHOLD_VALUES) + 0.5) / _THRESHOLD_VALUES
     found = []
-    for seen, end in ends:
-        parts = (np.arange(_THRESHOLD_VALUES) + 0.5) / _THRESHOLD_VALUES
-        if (end - seen) * np.sign(end) > 0:
-            found += [
-                {"position": seen + float(x) * (end - seen), "stiffness": stiffness, "damping": damping} for x in parts
-            ]
+    for side, seen, end in ((1.0, scales.seen_high[j], scales.high[j]), (-1.0, scales.seen_low[j], scales.low[j])):
+        for position in map(float, seen + parts * (end - seen) if side * (end - seen) > 0 else ()):
+            # The stiffness of a stop towards zero is negative.
+            signed = stiffness if side * position > 0 else -stiffness
+            found.append({"position": position, "stiffness": signed, "damping": damping})
     return found

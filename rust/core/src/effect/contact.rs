@@ -1,4 +1,5 @@
-//! A joint limit: beyond a position, on the side away from zero, a spring and damper push back and never pull.
+//! A joint limit: beyond a position a spring and damper push back and never pull. With a positive stiffness the stop lies on the position's side away
+//! from zero, with a negative one on its side towards zero, as the upper stop of a joint that moves at negative positions only.
 
 use super::{Edge, Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Spec, Trial};
 use crate::real::Real;
@@ -10,12 +11,12 @@ pub struct Contact;
 static SPEC: Spec = Spec {
     name: "contact",
     title: "contact with a stop",
-    equation: "tau_joint = tau - max(stiffness depth + damping speed, 0) beyond position",
+    equation: "tau_joint = tau - max(|stiffness| depth + damping speed, 0) beyond position; stiffness < 0: towards zero",
     source: "soft limits of common simulators",
     excited_by: "motion up to the stop",
     parameters: &[
         EffectParameter::threshold("position", Quantity::Reach, f64::NEG_INFINITY),
-        EffectParameter::bounded("stiffness", Quantity::ContactStiffness, 0.0, f64::INFINITY),
+        EffectParameter::signed("stiffness", Quantity::ContactStiffness),
         EffectParameter::bounded("damping", Quantity::ContactDamping, 0.0, f64::INFINITY),
     ],
     // Positions as shares of the farthest position reached on either side of zero.
@@ -36,21 +37,26 @@ static SPEC: Spec = Spec {
     ..Spec::OF_JOINT
 };
 
+/// Direction in which the joint moves into the stop, -1 or 1.
+fn side<T: Real>(p: &[T; MAX_PARAMETERS]) -> T {
+    if (p[0] < T::zero()) == (p[1] < T::zero()) { T::one() } else { -T::one() }
+}
+
 impl<T: Real> Effect<T> for Contact {
     fn spec(&self) -> &'static Spec {
         &SPEC
     }
 
     fn edge(&self, p: &[T; MAX_PARAMETERS]) -> Option<Edge<T>> {
-        Some(Edge { position: p[0], stiffness: p[1], damping: p[2] })
+        Some(Edge { position: p[0], side: side(p), stiffness: p[1].abs(), damping: p[2] })
     }
 
     fn force(&self, p: &[T; MAX_PARAMETERS], x: &JointPoint<T>) -> T {
-        let side = if p[0] < T::zero() { -T::one() } else { T::one() };
+        let side = side(p);
         let depth = side * (x.q - p[0]);
         if depth <= T::zero() {
             return T::zero();
         }
-        -side * (p[1] * depth + p[2] * side * x.dq).max(T::zero())
+        -side * (p[1].abs() * depth + p[2] * side * x.dq).max(T::zero())
     }
 }

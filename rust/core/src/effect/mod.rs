@@ -208,11 +208,13 @@ pub struct JointPoint<T> {
     pub memory: T,
 }
 
-/// Joint limit: position at which a joint's torque jumps, and stiffness and damping of the contact beyond this position, away from zero.
+/// Joint limit: position at which a joint's torque jumps, and the side beyond it, and stiffness and damping of the contact there.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Edge<T> {
     /// Joint position at which the torque jumps, rad or m.
     pub position: T,
+    /// Direction in which the joint moves beyond the position, -1 or 1.
+    pub side: T,
     /// Stiffness of the contact, N m/rad (N/m).
     pub stiffness: T,
     /// Damping of the contact, N m s/rad (N s/m).
@@ -220,10 +222,10 @@ pub struct Edge<T> {
 }
 
 impl<T: Real> Edge<T> {
-    /// Whether the joint position `q` lies beyond the edge, on the side away from zero.
+    /// Whether the joint position `q` lies beyond the edge.
     #[inline]
     pub fn is_behind(&self, q: T) -> bool {
-        (q - self.position) * self.position > T::zero()
+        (q - self.position) * self.side > T::zero()
     }
 
     /// Rate of the contact with a body of `inertia`, kg m^2 (kg), in 1/s: natural frequency, or damping rate if that is larger.

@@ -66,6 +66,9 @@ pub fn effect_instances<const N: usize>(
                     }
                 }
                 if !reached {
+                    let share = initial_guess[0];
+                    let towards_zero = effect.is_contact().then(|| scales.stop_towards_zero(joint, share));
+                    all.extend(towards_zero.flatten().map(|p| EffectInstance { p, ..effect }));
                     continue;
                 }
                 if !law.has_transmission() {

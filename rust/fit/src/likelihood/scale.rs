@@ -42,6 +42,9 @@ const HARDEST: f64 = 1e4;
 /// another effect.
 const FASTEST: f64 = 2.5;
 
+/// Initial guess of a stop's damping, relative to the joint's RMS torque over its RMS speed.
+const STOP_DAMPING: f64 = 0.1;
+
 /// Natural frequency of a typical elastic joint, 1/s.
 const SHAFT_RATE: f64 = 100.0;
 
@@ -129,6 +132,18 @@ impl<const N: usize> Scales<N> {
             }
             _ => Some(value * self.size(quantity, j)),
         }
+    }
+
+    /// Initial guess of a stop towards zero at one end of joint `j`'s travel, all of which lies on the other side of zero: position, stiffness
+    /// (negative) and damping. The stop lies inside the travel by the part that `share`, negative for the lower end, leaves to one; `None` where
+    /// it would lie beyond the middle.
+    pub fn stop_towards_zero(&self, j: usize, share: f64) -> Option<[f64; 3]> {
+        let [low, high] = self.travel[j];
+        let inside = 1.0 - share.abs();
+        let depth = inside * (high - low);
+        let position = if share > 0.0 { high - depth } else { low + depth };
+        let push = self.torque[j];
+        (inside < 0.5).then(|| [position, -push / depth, STOP_DAMPING * push / self.speed[j]])
     }
 
     /// Value from which a parameter's size is counted: its neutral value, or zero if it has none; for a rest position the middle of the travel.

@@ -191,11 +191,12 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> FitProblem<'_, A, N, P> 
         let mut lower: Vec<f64> = (0..P).map(friction).collect();
         let mut upper = vec![f64::INFINITY; P];
         for effect in &hypothesis.effects {
-            for parameter in effect.law.spec().parameters {
+            for (i, parameter) in effect.law.spec().parameters.iter().enumerate() {
+                let [least, most] = effect.bounds(i);
                 let reach = self.scales.largest(parameter.quantity, effect.joint);
                 let centre = self.scales.centre(parameter, effect.joint);
-                lower.push(parameter.lower.max(centre - reach));
-                upper.push(parameter.upper.min(centre + reach));
+                lower.push(least.max(centre - reach));
+                upper.push(most.min(centre + reach));
             }
         }
         (lower, upper)

@@ -68,6 +68,17 @@ impl EffectInstance {
         self.law.spec().parameters.first().is_some_and(|p| p.quantity == Quantity::Reach)
     }
 
+    /// Lower and upper bound of parameter `i` in a fit, SI: those of the library; the sign of a stop's stiffness, which tells its side, is kept.
+    pub fn bounds(&self, i: usize) -> [f64; 2] {
+        let parameter = &self.law.spec().parameters[i];
+        let [lower, upper] = [parameter.lower, parameter.upper];
+        match parameter.quantity {
+            Quantity::ContactStiffness if self.p[i] < 0.0 => [lower, upper.min(0.0)],
+            Quantity::ContactStiffness => [lower.max(0.0), upper],
+            _ => [lower, upper],
+        }
+    }
+
     /// Whether the effect is periodic in position: its parameters are amplitude, cycles per turn and phase.
     pub fn is_periodic(&self) -> bool {
         self.law.spec().parameters.iter().any(|p| p.quantity == Quantity::Cycles)

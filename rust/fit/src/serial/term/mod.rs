@@ -201,10 +201,11 @@ impl Term {
                 .spec()
                 .parameters
                 .iter()
-                .map(|p| TermParameter {
+                .enumerate()
+                .map(|(i, p)| TermParameter {
                     name: p.name,
                     unit: p.quantity.unit(rotary),
-                    bounds: [p.lower, p.upper],
+                    bounds: effect.bounds(i),
                     neutral: p.neutral,
                     inverse: None,
                 })
