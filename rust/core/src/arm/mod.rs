@@ -117,6 +117,8 @@ pub trait Arm<T: Real, const N: usize, const P: usize>: Clone + Send + Sync {
     const INERTIAL: usize = P - 2 * N;
     /// Whether the arm moves in one vertical plane, so that one angle, rad, describes a tilted base.
     const PLANAR: bool = true;
+    /// Whether [`Arm::constant_inertia`] is that of the motors' rotors alone, so that the torque that each transmission passes on is known.
+    const ROTORS_APART: bool = false;
 
     /// Inertia matrix `M(q)`, symmetric positive definite for physical `theta`.
     fn inertia(&self, theta: &[T; P], q: &SVector<T, N>) -> SMatrix<T, N, N>;

@@ -122,6 +122,7 @@ impl<T: Real, const N: usize, const P: usize> Arm<T, N, P> for Chain<T, N> {
     const PARAMETERS: &'static [Parameter] = &[];
     /// False: the base of a chain is tilted by turning its gravity vector ([`Chain::with_gravity`]).
     const PLANAR: bool = false;
+    const ROTORS_APART: bool = true;
 
     fn inertia(&self, theta: &[T; P], q: &SVector<T, N>) -> SMatrix<T, N, N> {
         check::<N, P>();

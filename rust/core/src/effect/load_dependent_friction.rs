@@ -1,21 +1,22 @@
-//! Friction that grows with the load on the joint: `mu |load| sgn dq`, the load being the torque `C dq + g` that the links put on it.
+//! Friction that grows with the load on the joint: `mu |load| sgn dq`. The load is the torque that the transmission passes on to the link, that for
+//! the link's inertia included; of arms whose parameters do not tell rotors from links it is the torque `C dq + g`.
 
 use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Spec};
 use crate::real::Real;
 
-/// Coulomb friction in proportion to the load that the joint carries: `mu |C dq + g| sgn dq`.
+/// Coulomb friction in proportion to the load that the joint carries: `mu |load| sgn dq`.
 #[derive(Debug)]
 pub struct LoadDependentFriction;
 
 static SPEC: Spec = Spec {
     name: "load_dependent_friction",
     title: "friction that grows with load",
-    equation: "f = mu |C dq + g| sgn dq",
+    equation: "f = mu |load| sgn dq; load = C dq + g, of serial arms M ddq + C dq + g of the links",
     source: "Hamon, Gautier and Garrec 2010",
     excited_by: "motion in both directions under different loads",
     parameters: &[EffectParameter::signed("mu", Quantity::Ratio)],
     initial_guesses: &[[0.05, 0.0, 0.0]],
-    hooks: Hooks::COULOMB,
+    hooks: Hooks { load: true, ..Hooks::COULOMB },
     ..Spec::OF_JOINT
 };
 

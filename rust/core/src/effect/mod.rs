@@ -112,12 +112,14 @@ pub struct Hooks {
     pub measured: bool,
     /// Whether the effect has [`Effect::hysteresis_after`].
     pub memory: bool,
+    /// Whether [`Effect::coulomb`] depends on the load of the joint.
+    pub load: bool,
 }
 
 impl Hooks {
     /// Hooks of an effect that changes the arm itself: none is called during a step.
     pub const NONE: Self =
-        Self { force: false, coulomb: false, command: false, measured: false, memory: false };
+        Self { force: false, coulomb: false, command: false, measured: false, memory: false, load: false };
     /// Hooks of an effect that is a torque at the joint.
     pub const FORCE: Self = Self { force: true, ..Self::NONE };
     /// Hooks of an effect that is a part of the Coulomb level.
@@ -198,7 +200,8 @@ pub struct JointPoint<T> {
     pub dq: T,
     /// Torque of the actuator, N m (N).
     pub tau: T,
-    /// Torque that gravity and the motion of other links put on the joint, `C dq + g`, N m (N).
+    /// Torque that the joint's transmission passes on to the link, N m (N), where the arm's parameters tell rotors from links
+    /// ([`crate::arm::Arm::ROTORS_APART`]); else the torque that gravity and the motion of other links put on the joint, `C dq + g`.
     pub load: T,
     /// Nominal friction `b |dq| + fc` at the joint's speed, N m (N).
     pub friction: T,

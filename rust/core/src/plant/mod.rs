@@ -4,6 +4,7 @@
 //! exactly zero velocity and the friction torque that keeps it at rest. [`Plant::acceleration`] is smooth while no mode changes;
 //! [`crate::integrate`] decides when a mode changes.
 
+mod acceleration;
 mod dynamics;
 mod laws;
 mod rates;
@@ -11,11 +12,10 @@ mod rates;
 pub(crate) use rates::SLIDING;
 pub use rates::StepRates;
 
-use crate::arm::{Arm, EquationTerms};
+use crate::arm::Arm;
 use crate::drivetrain::Drivetrain;
 use crate::effect::{Active, Hooks};
 use crate::kinematics::{JointState, KinematicState, RigidArm};
-use crate::linear::solve_positive_definite;
 use crate::real::Real;
 use crate::transmission::{LatentState, Sides};
 use nalgebra::SVector;
@@ -81,6 +81,8 @@ pub struct Plant<T: Real, A, const N: usize, const P: usize> {
     n_effects: usize,
     hooks: [Hooks; N],
     has_hysteresis: bool,
+    /// Whether friction depends on accelerations through the load that transmissions pass on.
+    passes_load: bool,
     jumps: bool,
 }
 
@@ -97,6 +99,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
             n_effects: 0,
             hooks: [Hooks::NONE; N],
             has_hysteresis: false,
+            passes_load: false,
             jumps: false,
         }
     }
@@ -127,6 +130,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         on_joint.force |= hooks.force;
         on_joint.coulomb |= hooks.coulomb;
         self.has_hysteresis |= hooks.memory;
+        self.passes_load |= hooks.load && A::ROTORS_APART;
         self.jumps |= effect.law.edge(&effect.p).is_some();
         let rigid = &mut self.rigid;
         let own = *rigid.arm.inertia(&rigid.theta, &SVector::zeros()).get((joint, joint))?;
@@ -216,16 +220,23 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         self.is_plain() && !self.jumps
     }
 
-    /// Whether friction is exact and there are no latent states; torques may jump at a position.
+    /// Whether friction is exact and does not depend on accelerations, and there are no latent states; torques may jump at a position.
     #[inline]
     pub fn is_plain(&self) -> bool {
-        !(0..N).any(|j| self.is_rounded(j)) && !self.drivetrain.any() && !self.has_hysteresis
+        !(0..N).any(|j| self.is_rounded(j))
+            && !self.drivetrain.any()
+            && !self.has_hysteresis
+            && !self.passes_load
     }
 
     /// Whether the plant has elastic joints or regularised friction, and no other latent states or torques that jump at a position.
     #[inline]
     pub fn is_elastic_or_regularised(&self) -> bool {
-        !self.is_plain() && !self.drivetrain.has_backlash() && !self.has_hysteresis && !self.jumps
+        !self.is_plain()
+            && !self.drivetrain.has_backlash()
+            && !self.has_hysteresis
+            && !self.jumps
+            && !self.passes_load
     }
 
     /// Hooks of the effects on joint `j`: whether they add a torque, and whether they change its Coulomb level.
@@ -369,113 +380,9 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         }
     }
 
-    /// Equation of motion solved for `ddq` under the torques `tau`, N m (N), that reach the joints through their transmissions.
-    #[inline]
-    fn undriven(
-        &self,
-        t: T,
-        kinematics: &KinematicState<T, N>,
-        tau: &SVector<T, N>,
-        modes: &[Mode; N],
-        latent: &LatentState<T, N>,
-    ) -> Accelerations<T, N> {
-        let KinematicState {
-            joints: JointState { q, dq },
-            equation_terms: EquationTerms { inertia, bias },
-            ..
-        } = kinematics;
-        let memory =
-            if self.has_hysteresis { self.memory(&SVector::from(*q), latent) } else { latent.memory };
-        let mut rhs = SVector::<T, N>::zeros();
-        let mut held = *modes;
-        for j in 0..N {
-            let hooks = self.hooks[j];
-            if self.drivetrain.brakes_motor(j, latent) {
-                let mut x = self.point(j, t, q[j], dq[j], tau[j], bias[j]);
-                x.other = self.sliding((j + 1) % N, dq, modes);
-                x.memory = memory[j];
-                rhs[j] = tau[j] - bias[j] + self.force(j, &x);
-                // Friction acts on the motor, so that no friction holds the link.
-                held[j] = Mode::Forward;
-                continue;
-            }
-            if !(hooks.force || hooks.coulomb) {
-                let dry = self.rigid.coulomb[j].max(T::zero()) * self.sliding(j, dq, modes);
-                rhs[j] = tau[j] - bias[j] - self.rigid.viscous[j] * dq[j] - dry;
-                continue;
-            }
-            let mut x = self.point(j, t, q[j], dq[j], tau[j], bias[j]);
-            if hooks.force {
-                x.other = self.sliding((j + 1) % N, dq, modes);
-                x.memory = memory[j];
-            }
-            rhs[j] = tau[j] - bias[j] - self.rigid.viscous[j] * dq[j] - self.dry_friction(j, &x, modes[j])
-                + self.force(j, &x);
-        }
-        self.solve(inertia, &rhs, &held)
-    }
-
-    /// Residual torque by inverse dynamics, N m (N): the torque that the measured motion `[q, dq, ddq]` needs beyond `tau`, with rigid transmissions
-    /// and with friction regularised over the plant's widths.
-    pub fn residual_torque(
-        &self,
-        t: T,
-        motion: [&SVector<T, N>; 3],
-        tau: &SVector<T, N>,
-        latent: &LatentState<T, N>,
-    ) -> SVector<T, N> {
-        let [q, dq, ddq] = motion;
-        let joints = JointState { q: core::array::from_fn(|j| q[j]), dq: core::array::from_fn(|j| dq[j]) };
-        let EquationTerms { mut inertia, bias } = self.rigid.equation_terms(&joints);
-        self.drivetrain.add_rotors(&mut inertia);
-        let memory = self.memory(q, latent);
-        let modes: [Mode; N] = core::array::from_fn(|j| Mode::of(dq[j]));
-        let mut residual = -tau;
-        for j in 0..N {
-            for k in 0..N {
-                residual[j] += inertia[j][k] * ddq[k];
-            }
-            let mut x = self.point(j, t, q[j], dq[j], tau[j], bias[j]);
-            x.other = self.sliding((j + 1) % N, &joints.dq, &modes);
-            x.memory = memory[j];
-            let friction = self.rigid.viscous[j] * dq[j] + self.dry_friction(j, &x, modes[j]);
-            residual[j] += bias[j] + friction - self.force(j, &x);
-        }
-        residual
-    }
-
-    /// Solves `M ddq = rhs` without the rows and columns of stuck joints.
-    #[inline]
-    fn solve(&self, inertia: &[[T; N]; N], rhs: &SVector<T, N>, modes: &[Mode; N]) -> Accelerations<T, N> {
-        let stuck = self.stuck(modes);
-        let (mut reduced, mut b) = (*inertia, *rhs);
-        for j in 0..N {
-            if stuck[j] {
-                for k in 0..N {
-                    reduced[j][k] = T::zero();
-                    reduced[k][j] = T::zero();
-                }
-                reduced[j][j] = T::one();
-                b[j] = T::zero();
-            }
-        }
-        let ddq = SVector::from(solve_positive_definite(reduced, b.into()));
-        let mut friction_at_rest = SVector::zeros();
-        for j in 0..N {
-            if stuck[j] {
-                friction_at_rest[j] = rhs[j];
-                for k in 0..N {
-                    friction_at_rest[j] -= inertia[j][k] * ddq[k];
-                }
-            }
-        }
-        let zero = SVector::zeros();
-        Accelerations { ddq, friction_at_rest, deflection_acceleration: zero, motor_friction: zero }
-    }
-
     /// Whether each joint is held at rest by exact dry friction.
     #[inline]
-    fn stuck(&self, modes: &[Mode; N]) -> [bool; N] {
+    pub(super) fn stuck(&self, modes: &[Mode; N]) -> [bool; N] {
         core::array::from_fn(|j| !self.is_rounded(j) && modes[j] == Mode::Stuck)
     }
 

@@ -275,7 +275,9 @@ impl Term {
             return table.changes_command();
         }
         let TermKind::Law(effect) = self.kind else { return self.share_of_command().is_some() };
-        effect.law.spec().hooks.command || depends(&effect, |x, value| x.tau = value)
+        // The load of a joint is computed from the command.
+        let hooks = effect.law.spec().hooks;
+        hooks.command || hooks.load || depends(&effect, |x, value| x.tau = value)
     }
 
     /// Factor by which a changed proportional gain multiplies the controller's torque; `None` for other terms (a derivative gain acts like viscous
@@ -322,7 +324,7 @@ impl Term {
 }
 
 /// Whether an effect's torque depends on the quantity of the joint's state (position, velocity, torque) that `set` assigns.
-pub fn depends(effect: &EffectInstance, set: impl Fn(&mut JointPoint<f64>, f64)) -> bool {
+fn depends(effect: &EffectInstance, set: impl Fn(&mut JointPoint<f64>, f64)) -> bool {
     let torque = |value: f64| {
         let mut x = JointPoint {
             t: 1.0,

@@ -5,7 +5,7 @@ use crate::model::hypothesis::EffectInstance;
 use crate::serial::controller::commanded::Commanded;
 use crate::serial::predict::turned;
 use crate::serial::term::transmission::Computed;
-use crate::serial::term::{Term, TermKind, depends, of_load};
+use crate::serial::term::{Term, TermKind, of_load};
 use crate::serial::weak_form::intervals::{Intervals, Middle, TestFunction};
 use crate::serial::weak_form::rows::{JointRows, Rows, Signal, sum};
 use armgap_core::arm::Arm;
@@ -287,7 +287,6 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         let (spec, j) = (effect.law.spec(), effect.joint);
         let viscous = self.arm.viscous(theta)[j];
         let coulomb = self.arm.coulomb(theta)[j];
-        let needs_load = depends(effect, |x, value| x.load = value);
         let (mut memory, mut before) = (0.0, None);
         let torque = |m: &Middle<N>| {
             if spec.hooks.memory {
@@ -306,7 +305,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
                 memory,
             };
             let direction = sign(x.dq);
-            if needs_load {
+            if spec.hooks.load {
                 let passed = self.motor_torque(m, j, theta);
                 for _ in 0..LOAD_STEPS {
                     x.load = passed - effect.law.coulomb(&effect.p, &x, direction) * direction;

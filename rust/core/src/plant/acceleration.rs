@@ -1,0 +1,147 @@
+//! Accelerations of the joints, and the residual torque by inverse dynamics.
+
+use super::{Accelerations, Mode, Plant};
+use crate::arm::{Arm, EquationTerms};
+use crate::kinematics::{JointState, KinematicState};
+use crate::linear::solve_positive_definite;
+use crate::real::Real;
+use crate::transmission::LatentState;
+use nalgebra::SVector;
+
+/// Fixed-point steps for accelerations on which friction depends through the load; the error falls by the friction's share of the load with each.
+const LOAD_STEPS: usize = 4;
+
+impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P> {
+    /// Equation of motion solved for `ddq` under the torques `tau`, N m (N), that reach the joints through their transmissions.
+    #[inline]
+    pub(super) fn undriven(
+        &self,
+        t: T,
+        kinematics: &KinematicState<T, N>,
+        tau: &SVector<T, N>,
+        modes: &[Mode; N],
+        latent: &LatentState<T, N>,
+    ) -> Accelerations<T, N> {
+        let KinematicState {
+            joints: JointState { q, dq },
+            equation_terms: EquationTerms { inertia, bias },
+            ..
+        } = kinematics;
+        let memory =
+            if self.has_hysteresis { self.memory(&SVector::from(*q), latent) } else { latent.memory };
+        let mut held = *modes;
+        for j in 0..N {
+            if self.drivetrain.brakes_motor(j, latent) {
+                // Friction acts on the motor, so that no friction holds the link.
+                held[j] = Mode::Forward;
+            }
+        }
+        let forces = |loads: &[T; N]| {
+            let mut rhs = SVector::<T, N>::zeros();
+            for j in 0..N {
+                let hooks = self.hooks[j];
+                if self.drivetrain.brakes_motor(j, latent) {
+                    let mut x = self.point(j, t, q[j], dq[j], tau[j], loads[j]);
+                    x.other = self.sliding((j + 1) % N, dq, modes);
+                    x.memory = memory[j];
+                    rhs[j] = tau[j] - bias[j] + self.force(j, &x);
+                    continue;
+                }
+                if !(hooks.force || hooks.coulomb) {
+                    let dry = self.rigid.coulomb[j].max(T::zero()) * self.sliding(j, dq, modes);
+                    rhs[j] = tau[j] - bias[j] - self.rigid.viscous[j] * dq[j] - dry;
+                    continue;
+                }
+                let mut x = self.point(j, t, q[j], dq[j], tau[j], loads[j]);
+                if hooks.force {
+                    x.other = self.sliding((j + 1) % N, dq, modes);
+                    x.memory = memory[j];
+                }
+                rhs[j] =
+                    tau[j] - bias[j] - self.rigid.viscous[j] * dq[j] - self.dry_friction(j, &x, modes[j])
+                        + self.force(j, &x);
+            }
+            rhs
+        };
+        let mut motion = self.solve(inertia, &forces(bias), &held);
+        if self.passes_load {
+            for _ in 0..LOAD_STEPS {
+                motion = self.solve(inertia, &forces(&self.loads(inertia, bias, &motion.ddq)), &held);
+            }
+        }
+        motion
+    }
+
+    /// Load of each joint, N m (N), at the accelerations `ddq`: the torque that its transmission passes on, or the bias where that is not known.
+    #[inline]
+    fn loads(&self, inertia: &[[T; N]; N], bias: &[T; N], ddq: &SVector<T, N>) -> [T; N] {
+        let mut loads = *bias;
+        if A::ROTORS_APART {
+            for (j, load) in loads.iter_mut().enumerate() {
+                for k in 0..N {
+                    *load += (inertia[j][k] - self.rigid.constant_inertia[j][k]) * ddq[k];
+                }
+            }
+        }
+        loads
+    }
+
+    /// Residual torque by inverse dynamics, N m (N): the torque that the measured motion `[q, dq, ddq]` needs beyond `tau`, with rigid transmissions
+    /// and with friction regularised over the plant's widths.
+    pub fn residual_torque(
+        &self,
+        t: T,
+        motion: [&SVector<T, N>; 3],
+        tau: &SVector<T, N>,
+        latent: &LatentState<T, N>,
+    ) -> SVector<T, N> {
+        let [q, dq, ddq] = motion;
+        let joints = JointState { q: core::array::from_fn(|j| q[j]), dq: core::array::from_fn(|j| dq[j]) };
+        let EquationTerms { mut inertia, bias } = self.rigid.equation_terms(&joints);
+        self.drivetrain.add_rotors(&mut inertia);
+        let memory = self.memory(q, latent);
+        let modes: [Mode; N] = core::array::from_fn(|j| Mode::of(dq[j]));
+        let loads = self.loads(&inertia, &bias, ddq);
+        let mut residual = -tau;
+        for j in 0..N {
+            for k in 0..N {
+                residual[j] += inertia[j][k] * ddq[k];
+            }
+            let mut x = self.point(j, t, q[j], dq[j], tau[j], loads[j]);
+            x.other = self.sliding((j + 1) % N, &joints.dq, &modes);
+            x.memory = memory[j];
+            let friction = self.rigid.viscous[j] * dq[j] + self.dry_friction(j, &x, modes[j]);
+            residual[j] += bias[j] + friction - self.force(j, &x);
+        }
+        residual
+    }
+
+    /// Solves `M ddq = rhs` without the rows and columns of stuck joints.
+    #[inline]
+    fn solve(&self, inertia: &[[T; N]; N], rhs: &SVector<T, N>, modes: &[Mode; N]) -> Accelerations<T, N> {
+        let stuck = self.stuck(modes);
+        let (mut reduced, mut b) = (*inertia, *rhs);
+        for j in 0..N {
+            if stuck[j] {
+                for k in 0..N {
+                    reduced[j][k] = T::zero();
+                    reduced[k][j] = T::zero();
+                }
+                reduced[j][j] = T::one();
+                b[j] = T::zero();
+            }
+        }
+        let ddq = SVector::from(solve_positive_definite(reduced, b.into()));
+        let mut friction_at_rest = SVector::zeros();
+        for j in 0..N {
+            if stuck[j] {
+                friction_at_rest[j] = rhs[j];
+                for k in 0..N {
+                    friction_at_rest[j] -= inertia[j][k] * ddq[k];
+                }
+            }
+        }
+        let zero = SVector::zeros();
+        Accelerations { ddq, friction_at_rest, deflection_acceleration: zero, motor_friction: zero }
+    }
+}
