@@ -60,3 +60,27 @@ impl<T: Real> Effect<T> for Contact {
         -side * (p[1].abs() * depth + p[2] * side * x.dq).max(T::zero())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_sign_of_the_stiffness_says_on_which_side_of_the_position_the_stop_lies() {
+        for (position, stiffness, side) in
+            [(0.4, 50.0, 1.0), (-0.4, 50.0, -1.0), (-0.4, -50.0, 1.0), (0.4, -50.0, -1.0)]
+        {
+            let p = [position, stiffness, 2.0];
+            let at = |depth: f64, speed: f64| {
+                let (q, dq) = (position + side * depth, side * speed);
+                JointPoint { t: 0.0, q, dq, tau: 0.0, load: 0.0, friction: 0.0, other: 0.0, memory: 0.0 }
+            };
+            let push = |depth, speed| Contact.force(&p, &at(depth, speed)) * side;
+            assert_eq!([push(-0.01, 0.5), push(0.01, -0.3)], [0.0, 0.0], "outside, and never a pull");
+            assert!((push(0.01, 0.1) + 0.7).abs() < 1e-12, "{}", push(0.01, 0.1));
+            let edge = Contact.edge(&p).unwrap();
+            assert_eq!((edge.side, edge.stiffness), (side, 50.0));
+            assert!(edge.is_behind(position + 0.01 * side) && !edge.is_behind(position - 0.01 * side));
+        }
+    }
+}

@@ -145,3 +145,45 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         Accelerations { ddq, friction_at_rest, deflection_acceleration: zero, motor_friction: zero }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::chain::{Chain, ChainJoint, JointKind, point_mass};
+    use crate::effect::{Active, find};
+
+    /// One turning link of inertia 0.8 kg m^2 without gravity, with a rotor of 0.3 kg m^2 and friction of 0.2 of the load.
+    fn turning(name: &'static str) -> Plant<f64, Chain<f64, 1>, 1, 13> {
+        let joint = ChainJoint {
+            kind: JointKind::Revolute,
+            rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            translation: [0.0; 3],
+            axis: [0.0, 0.0, 1.0],
+        };
+        let mut theta = [0.0; 13];
+        theta[..10].copy_from_slice(&point_mass(0.8, [1.0, 0.0, 0.0]));
+        theta[10..].copy_from_slice(&[0.3, 0.5, 0.4]);
+        let law = find::<f64>(name).unwrap();
+        Plant::new(Chain::new([joint], [0.0; 3]), theta)
+            .with_effect(Active { law, joint: 0, p: [0.2, 0.0, 0.0] })
+            .unwrap()
+    }
+
+    #[test]
+    fn friction_by_load_takes_the_torque_for_the_links_inertia_without_the_rotors() {
+        let plant = turning("load_dependent_friction");
+        assert!(!plant.is_plain() && turning("coulomb_asymmetry").is_plain());
+        for (tau, dq) in [(3.0, 0.7), (-3.0, 0.7), (-2.0, -0.5)] {
+            let kinematics = plant.rigid().kinematics(&JointState { q: [0.0], dq: [dq] });
+            let latent = LatentState::none(SVector::zeros());
+            let ddq = plant.acceleration(0.0, &kinematics, &[tau].into(), &[Mode::of(dq)], &latent).ddq[0];
+            let load = 0.8 * ddq;
+            let left = tau - 0.3 * ddq - load - 0.5 * dq - (0.4 + 0.2 * f64::abs(load)) * dq.signum();
+            // The fixed-point steps leave the fourth power of the friction's share of the load.
+            assert!(left.abs() < 0.01 * f64::abs(load), "{left} of {load}");
+            let motion = [SVector::zeros(), [dq].into(), [ddq].into()];
+            let residual = plant.residual_torque(0.0, [&motion[0], &motion[1], &motion[2]], &[tau].into(), &latent)[0];
+            assert!((residual + left).abs() < 1e-12, "{residual}");
+        }
+    }
+}

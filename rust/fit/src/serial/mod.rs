@@ -270,10 +270,6 @@ fn candidates<const N: usize, const P: usize>(
         if spec.scope == Scope::Arm || spec.trial == Trial::Disturbance || effect.law.has_transmission() {
             continue;
         }
-        // A rotor inertia that the arm file has is one of the arm's parameters.
-        if effect.law.inertia(&effect.p) > 0.0 && theta[10 * N + effect.joint] > 0.0 {
-            continue;
-        }
         // Sine and cosine of a ripple are tested together, for as many cycles over the travel as the test functions let through.
         if effect.is_periodic() {
             if !groups.iter().any(|group| group[0].same_place(&Term::of_law(effect))) {

@@ -4,7 +4,7 @@ use crate::log::track::LARGEST_ERROR;
 use crate::model::hypothesis::Hypothesis;
 use crate::predict::window::{Dataset, Window};
 use crate::serial::controller::closed_loop::ClosedLoop;
-use crate::serial::term::row_term::{RowTerm, without_rows};
+use crate::serial::term::row_term::{RowTerm, torques_of_rows, without_rows};
 use crate::serial::term::{Term, TermKind, of_load};
 use armgap_core::arm::Arm;
 use armgap_core::chain::Chain;
@@ -63,19 +63,19 @@ impl<const N: usize, const P: usize> Model<N, P> {
 
     /// Predicted positions of all windows of `data`, rad or m, sample by sample and joint by joint.
     pub fn predict(&self, data: &Dataset<N>) -> Vec<f64> {
-        if !self.rows.is_empty() {
-            let tracks = data.tracks.iter().map(|track| without_rows(track, &self.rows)).collect();
-            let beside = Dataset { tracks, windows: data.windows.clone(), rows: data.rows };
-            return self.predict_along(&beside);
+        if let Some(closed_loop) = &self.closed_loop {
+            let beside: Vec<Vec<[f64; N]>> = match self.rows.as_slice() {
+                [] => Vec::new(),
+                rows => data.tracks.iter().map(|track| torques_of_rows(track, rows)).collect(),
+            };
+            return closed_loop.predict(data, &self.arm, &self.hypothesis, &beside);
         }
-        self.predict_along(data)
-    }
-
-    fn predict_along(&self, data: &Dataset<N>) -> Vec<f64> {
-        match &self.closed_loop {
-            Some(closed_loop) => closed_loop.predict(data, &self.arm, &self.hypothesis),
-            None => data.predict_singly(&self.arm, &self.hypothesis),
+        if self.rows.is_empty() {
+            return data.predict_singly(&self.arm, &self.hypothesis);
         }
+        let tracks = data.tracks.iter().map(|track| without_rows(track, &self.rows)).collect();
+        let beside = Dataset { tracks, windows: data.windows.clone(), rows: data.rows };
+        beside.predict_singly(&self.arm, &self.hypothesis)
     }
 }
 

@@ -132,11 +132,13 @@ impl Servo {
 
 impl<const N: usize> ClosedLoop<N> {
     /// Predicted positions of all windows, rad or m, each from its measured initial state; windows of logs without a reference count as diverged.
+    /// `beside` holds torques that act against the motors' on the joints, N m or N, by log and sample interval; empty where there are none.
     pub fn predict<A: Arm<f64, N, P>, const P: usize>(
         &self,
         data: &Dataset<N>,
         arm: &A,
         hypothesis: &Hypothesis<P>,
+        beside: &[Vec<[f64; N]>],
     ) -> Vec<f64> {
         let mut predicted = vec![DIVERGED; data.rows * N];
         let Some(plant) = hypothesis.plant(arm) else { return predicted };
@@ -164,11 +166,22 @@ impl<const N: usize> ClosedLoop<N> {
         }
         runs.into_par_iter().for_each(|(window, state, positions)| {
             if let Some(servos) = &servos[window.track] {
-                run(&plant, hypothesis, servos, &data.tracks[window.track].t, (window, state), positions);
+                let along = Along {
+                    t: &data.tracks[window.track].t,
+                    beside: beside.get(window.track).map(Vec::as_slice),
+                };
+                run(&plant, hypothesis, servos, along, (window, state), positions);
             }
         });
         predicted
     }
+}
+
+/// Sample times of a log, s, and torques against the motors' along it, N m or N, by sample interval.
+#[derive(Clone, Copy)]
+struct Along<'a, const N: usize> {
+    t: &'a [f64],
+    beside: Option<&'a [[f64; N]]>,
 }
 
 /// Simulates one window of a log, from a state at its start, and writes the predicted positions, rad or m, sample by sample and joint by joint, into `positions`.
@@ -176,7 +189,7 @@ fn run<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     plant: &Plant<f64, A, N, P>,
     hypothesis: &Hypothesis<P>,
     servos: &[Servo],
-    t: &[f64],
+    Along { t, beside }: Along<'_, N>,
     (window, mut state): (&Window<N>, State<f64, N>),
     positions: &mut [f64],
 ) {
@@ -187,12 +200,13 @@ fn run<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         let h = t[k + 1] - t[k];
         let count = periods(plant, servos, &state.q, h);
         let period = h / count as f64;
+        let against = beside.and_then(|torques| torques.get(k)).unwrap_or(&[0.0; N]);
         for i in 0..count {
             let (halfway, now) = ((i as f64 + 0.5) / count as f64, t[k] + i as f64 * period);
             let mut expected =
                 State { q: state.q + 0.5 * period * state.dq, dq: state.dq + 0.5 * period * ddq, ..state };
             expected.latent.deflection += 0.5 * period * state.latent.deflection_rate;
-            let torque = std::array::from_fn(|j| {
+            let torque: [InputSegment<f64>; N] = std::array::from_fn(|j| {
                 let servo = &servos[j];
                 let (q, dq) = shown(plant, hypothesis, &expected, j);
                 let error = servo.reference[k].at(halfway) - q;
@@ -200,7 +214,10 @@ fn run<A: Arm<f64, N, P>, const N: usize, const P: usize>(
                     [servo.controller.proportional(error), servo.rate[k].at(halfway) - dq, integral[j]];
                 integral[j] += period * error;
                 let asked: f64 = servo.controller.gains.iter().zip(inputs).map(|(gain, e)| gain * e).sum();
-                servo.delivered(&mut past[j], now, period, servo.controller.clipped(asked))
+                let InputSegment { start, middle, end } =
+                    servo.delivered(&mut past[j], now, period, servo.controller.clipped(asked));
+                let by = against[j];
+                InputSegment { start: start - by, middle: middle - by, end: end - by }
             });
             let before = state.dq;
             advance(plant, &mut state, &Interval { t: now, h: period, torque: &torque }, 1);
@@ -281,6 +298,15 @@ mod tests {
 
     /// Predicted positions, rad, of a pendulum without gravity behind `servo`; its log is at rest and gives the initial state alone.
     fn predicted(servo: JointController, effects: Vec<EffectInstance>) -> Vec<f64> {
+        predicted_beside(servo, effects, &[])
+    }
+
+    /// Predicted positions as of [`predicted`], beside torques against the motor's by log and sample interval, N m.
+    fn predicted_beside(
+        servo: JointController,
+        effects: Vec<EffectInstance>,
+        beside: &[Vec<[f64; 1]>],
+    ) -> Vec<f64> {
         let count = 160;
         let t: Vec<f64> = (0..count).map(|k| PERIOD * k as f64).collect();
         let mut track = Track::<1>::new("", &t, &vec![0.0; count], &[], Some([1e-6]));
@@ -288,7 +314,7 @@ mod tests {
         let data = crate::result::gap::whole(&Dataset { tracks: vec![track], windows: Vec::new(), rows: 0 });
         let hypothesis = Hypothesis { effects, ..Hypothesis::rigid([INERTIA, 0.0, VISCOUS, 0.0]) };
         let closed_loop = ClosedLoop { joints: vec![servo], held_before: vec![[0.0]] };
-        closed_loop.predict(&data, &Pendulum { gravity: 0.0 }, &hypothesis)
+        closed_loop.predict(&data, &Pendulum { gravity: 0.0 }, &hypothesis, beside)
     }
 
     /// Positions, rad, of a pendulum behind `servo` by explicit Euler steps; `torque` returns the delivered torque from the torques commanded so far.
@@ -368,6 +394,15 @@ mod tests {
     }
 
     #[test]
+    fn torques_of_rows_act_in_the_loop() {
+        let torque = |k: usize| 3.0 * (0.1 * k as f64).sin();
+        let found = predicted_beside(SERVO, Vec::new(), &[(0..159).map(|k| [torque(k)]).collect()]);
+        let against = |asked: &[f64]| last(asked) - torque((asked.len() - 1) / 250);
+        let off = apart(&found, &stepped(&SERVO, against));
+        assert!(off < STEPPED && apart(&found, &predicted(SERVO, Vec::new())) > 50.0 * STEPPED, "{off}");
+    }
+
+    #[test]
     fn a_late_reference_moves_the_answer() {
         let late = predicted(JointController { reference_delay: 2.0 * PERIOD, ..SERVO }, Vec::new());
         let prompt = predicted(SERVO, Vec::new());
@@ -385,7 +420,7 @@ mod tests {
         let data = crate::result::gap::whole(&Dataset { tracks: vec![track], windows: Vec::new(), rows: 0 });
         let closed_loop = ClosedLoop { joints: vec![servo], held_before: vec![[held]] };
         let hypothesis = Hypothesis::rigid([INERTIA, 0.0, VISCOUS, 0.0]);
-        let found = closed_loop.predict(&data, &Pendulum { gravity: 0.0 }, &hypothesis);
+        let found = closed_loop.predict(&data, &Pendulum { gravity: 0.0 }, &hypothesis, &[]);
         assert!((found[158] - held / 200.0).abs() < STEPPED, "{}", found[158]);
     }
 }

@@ -181,11 +181,15 @@ impl Search<'_> {
     /// Torque of a term along the training logs per unit of one of its amplitudes, with its other amplitudes at their neutral values.
     pub(in crate::serial) fn unit(&self, term: &Term, amplitude: usize, theta: &[f64]) -> Signal {
         let neutral = term.parameters(self.rotary_of(term));
-        let mut p = term.p.clone();
+        let (mut p, unit) = (term.p.clone(), term.unit());
         for (i, value) in p.iter_mut().enumerate().take(term.amplitudes()) {
-            *value = neutral[i].neutral + if i == amplitude { 1.0 } else { 0.0 };
+            *value = neutral[i].neutral + if i == amplitude { unit } else { 0.0 };
         }
-        self.training.signal(&term.with(p), theta)
+        let mut signal = self.training.signal(&term.with(p), theta);
+        if unit != 1.0 {
+            signal.iter_mut().flatten().flatten().for_each(|torque| *torque /= unit);
+        }
+        signal
     }
 
     /// Candidates that are not in the model, each with the values and the decrease of the cost of its best first-order test, largest decrease first.

@@ -228,14 +228,13 @@ impl Term {
         }
     }
 
-    /// Number of leading parameters in which the term's torque is linear and with which it vanishes when all of them are at their neutral values; 0
-    /// where the torque is linear in no parameter.
+    /// Number of leading parameters in which the term's torque is linear, or nearly so ([`Self::unit`]), and with which it vanishes when all of them
+    /// are at their neutral values; 0 where the torque is linear in no parameter.
     pub fn amplitudes(&self) -> usize {
         match self.kind {
             TermKind::Law(effect) => {
                 let spec = effect.law.spec();
                 let is_linear = !spec.hooks.command
-                    && !spec.hooks.measured
                     && spec.parameters.first().is_some_and(|p| p.quantity != Quantity::Reach);
                 match spec.trial {
                     Trial::Amplitudes(count) if is_linear => count,
@@ -249,6 +248,18 @@ impl Term {
             TermKind::Row(RowTerm { law: RowLaw::Transmission(_), .. }) => 3,
             TermKind::Row(_) => 1,
             TermKind::Table(_) => CLASSES,
+        }
+    }
+
+    /// Value of an amplitude at which the torque per unit of this amplitude is computed: one, or the initial guess of an effect on measured positions,
+    /// whose torque is linear for small displacements only.
+    pub fn unit(&self) -> f64 {
+        match self.kind {
+            TermKind::Law(effect) if effect.law.spec().hooks.measured => {
+                effect.p.iter().map(|p| p.abs()).fold(0.0, f64::max)
+            }
+            TermKind::Joints(ref of) => of.members[0].unit(),
+            _ => 1.0,
         }
     }
 

@@ -150,23 +150,28 @@ impl RowTerm {
     }
 }
 
-/// A copy of a log with the torques of `rows`, terms on two coupled joints with their parameters, subtracted along the measured motion, as the
-/// integrator cannot simulate such terms.
-pub fn without_rows<const N: usize>(track: &Track<N>, rows: &[(RowTerm, Vec<f64>)]) -> Track<N> {
-    let mut track = track.clone();
-    let intervals = Intervals::new(&track);
-    for (held, m) in track.held.iter_mut().zip(&intervals.middles) {
+/// Torques of `rows`, terms on two coupled joints with their parameters, on the joints along the measured motion of a log, by sample interval, N m or N,
+/// as the integrator cannot simulate such terms.
+pub fn torques_of_rows<const N: usize>(track: &Track<N>, rows: &[(RowTerm, Vec<f64>)]) -> Vec<[f64; N]> {
+    let of = |m: &Middle<N>| {
+        let mut torques = [0.0; N];
         for (row, p) in rows {
             let torque = row.torque(m, p);
-            for (j, by) in [(row.first, torque), (row.first + 1, row.factor * torque)] {
-                let segment = &mut held[j];
-                *segment = InputSegment {
-                    start: segment.start - by,
-                    middle: segment.middle - by,
-                    end: segment.end - by,
-                };
-            }
+            torques[row.first] += torque;
+            torques[row.first + 1] += row.factor * torque;
         }
+        torques
+    };
+    Intervals::new(track).middles.iter().map(of).collect()
+}
+
+/// A copy of a log with the torques of `rows` ([`torques_of_rows`]) subtracted from the motors' torques.
+pub fn without_rows<const N: usize>(track: &Track<N>, rows: &[(RowTerm, Vec<f64>)]) -> Track<N> {
+    let mut track = track.clone();
+    let torques = torques_of_rows(&track, rows);
+    for (segment, by) in track.held.iter_mut().flatten().zip(torques.iter().flatten()) {
+        let InputSegment { start, middle, end } = *segment;
+        *segment = InputSegment { start: start - by, middle: middle - by, end: end - by };
     }
     track
 }
