@@ -85,6 +85,21 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> RigidArm<T, A, N,
         }
         self.rotated(joints, rotated(sincos, &rotations))
     }
+
+    /// Load of each joint, N m (N), at the accelerations `ddq`, given the inertia matrix, which may hold further rotors, and the bias: the torque that
+    /// its transmission passes on to the link, or the bias where the arm's parameters do not tell that ([`Arm::ROTORS_APART`]).
+    #[inline]
+    pub fn loads(&self, equation_terms: &EquationTerms<T, N>, ddq: &[T; N]) -> [T; N] {
+        let mut loads = equation_terms.bias;
+        if A::ROTORS_APART {
+            for (j, load) in loads.iter_mut().enumerate() {
+                for k in 0..N {
+                    *load += (equation_terms.inertia[j][k] - self.constant_inertia[j][k]) * ddq[k];
+                }
+            }
+        }
+        loads
+    }
 }
 
 /// Positions and velocities of all joints.

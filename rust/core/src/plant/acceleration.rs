@@ -24,7 +24,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
     ) -> Accelerations<T, N> {
         let KinematicState {
             joints: JointState { q, dq },
-            equation_terms: EquationTerms { inertia, bias },
+            equation_terms: equation_terms @ EquationTerms { inertia, bias },
             ..
         } = kinematics;
         let memory =
@@ -66,24 +66,10 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         let mut motion = self.solve(inertia, &forces(bias), &held);
         if self.passes_load {
             for _ in 0..LOAD_STEPS {
-                motion = self.solve(inertia, &forces(&self.loads(inertia, bias, &motion.ddq)), &held);
+                motion = self.solve(inertia, &forces(&self.rigid.loads(equation_terms, &motion.ddq.into())), &held);
             }
         }
         motion
-    }
-
-    /// Load of each joint, N m (N), at the accelerations `ddq`: the torque that its transmission passes on, or the bias where that is not known.
-    #[inline]
-    fn loads(&self, inertia: &[[T; N]; N], bias: &[T; N], ddq: &SVector<T, N>) -> [T; N] {
-        let mut loads = *bias;
-        if A::ROTORS_APART {
-            for (j, load) in loads.iter_mut().enumerate() {
-                for k in 0..N {
-                    *load += (inertia[j][k] - self.rigid.constant_inertia[j][k]) * ddq[k];
-                }
-            }
-        }
-        loads
     }
 
     /// Residual torque by inverse dynamics, N m (N): the torque that the measured motion `[q, dq, ddq]` needs beyond `tau`, with rigid transmissions
@@ -101,7 +87,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         self.drivetrain.add_rotors(&mut inertia);
         let memory = self.memory(q, latent);
         let modes: [Mode; N] = core::array::from_fn(|j| Mode::of(dq[j]));
-        let loads = self.loads(&inertia, &bias, ddq);
+        let loads = self.rigid.loads(&EquationTerms { inertia, bias }, &(*ddq).into());
         let mut residual = -tau;
         for j in 0..N {
             for k in 0..N {

@@ -286,9 +286,7 @@ impl Term {
             return table.changes_command();
         }
         let TermKind::Law(effect) = self.kind else { return self.share_of_command().is_some() };
-        // The load of a joint is computed from the command.
-        let hooks = effect.law.spec().hooks;
-        hooks.command || hooks.load || depends(&effect, |x, value| x.tau = value)
+        effect.law.spec().hooks.command || depends(&effect, |x, value| x.tau = value)
     }
 
     /// Factor by which a changed proportional gain multiplies the controller's torque; `None` for other terms (a derivative gain acts like viscous

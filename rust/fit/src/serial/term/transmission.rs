@@ -234,7 +234,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
     }
 
     /// Torque that the motor of joint `j` passes on along the measured motion, N m or N: the motor's torque less those of rotor inertia and friction.
-    pub(in crate::serial) fn motor_torque(&self, m: &Middle<N>, j: usize, theta: &[f64; P]) -> f64 {
+    fn motor_torque(&self, m: &Middle<N>, j: usize, theta: &[f64; P]) -> f64 {
         let friction = self.arm.friction(theta, &SVector::from(m.dq))[j];
         m.tau[j] - theta[10 * N + j] * m.ddq[j] - friction
     }

@@ -24,9 +24,6 @@ const MOSTLY_AT_REST: f64 = 0.05;
 /// Time step of the numerical derivative of the inertia matrix along the motion, s.
 const RATE_STEP: f64 = 1e-5;
 
-/// Fixed-point steps for the load of a joint whose friction depends on the load; the error falls by the friction's share of the load with each.
-const LOAD_STEPS: usize = 5;
-
 /// Approximate number of samples along the logs at which the inertia matrix is evaluated.
 const POSES: usize = 200;
 
@@ -281,12 +278,12 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         signal
     }
 
-    /// Torque of an effect along a log, sample interval by sample interval, N m or N. The load of a joint is the torque that its transmission passes on
-    /// to the link: the motor's without what its rotor and the joint's friction take, the effect's own included.
+    /// Torque of an effect along a log, sample interval by sample interval, N m or N.
     fn along(&self, log: &Intervals<N>, effect: &EffectInstance, theta: &[f64; P]) -> Vec<f64> {
         let (spec, j) = (effect.law.spec(), effect.joint);
         let viscous = self.arm.viscous(theta)[j];
         let coulomb = self.arm.coulomb(theta)[j];
+        let rigid = self.rigid(theta);
         let (mut memory, mut before) = (0.0, None);
         let torque = |m: &Middle<N>| {
             if spec.hooks.memory {
@@ -306,10 +303,8 @@ impl<const N: usize, const P: usize> Equation<N, P> {
             };
             let direction = sign(x.dq);
             if spec.hooks.load {
-                let passed = self.motor_torque(m, j, theta);
-                for _ in 0..LOAD_STEPS {
-                    x.load = passed - effect.law.coulomb(&effect.p, &x, direction) * direction;
-                }
+                let equation_terms = rigid.equation_terms(&JointState { q: m.q, dq: m.dq });
+                x.load = rigid.loads(&equation_terms, &m.ddq)[j];
             }
             let level = if spec.hooks.coulomb { effect.law.coulomb(&effect.p, &x, direction) } else { 0.0 };
             let force = if spec.hooks.force { effect.law.force(&effect.p, &x) } else { 0.0 };
