@@ -132,4 +132,22 @@ mod tests {
             assert!((value / true_value - 1.0).abs() < 0.1, "{found:?}");
         }
     }
+
+    #[test]
+    fn where_all_of_the_travel_is_negative_its_upper_stop_lies_towards_zero() {
+        let (position, stiffness, damping) = (-0.6, 120.0, 3.0);
+        let sample = |i: usize| {
+            let t = 0.004 * i as f64;
+            let (q, dq) = (0.5 * t.sin() - 1.0, 0.5 * t.cos());
+            let depth = q - position;
+            let push = if depth > 0.0 { (stiffness * depth + damping * dq).max(0.0) } else { 0.0 };
+            ContactSample { q, dq, residual: -push }
+        };
+        let mut samples: Vec<ContactSample> = (0..4000).map(sample).collect();
+        let found = hinge(&mut samples, 1.0).expect("the stop");
+        for (value, true_value) in found.iter().zip([position, -stiffness, damping]) {
+            assert!((value / true_value - 1.0).abs() < 0.1, "{found:?}");
+        }
+        assert_eq!(hinge(&mut samples, -1.0), None);
+    }
 }

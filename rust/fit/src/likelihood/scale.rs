@@ -180,3 +180,31 @@ fn standard_deviation(x: Vec<f64>) -> f64 {
     let mean = x.iter().sum::<f64>() / x.len().max(1) as f64;
     rms(x.into_iter().map(|x| x - mean))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stop_towards_zero_lies_inside_the_end_of_the_travel_that_is_nearest_to_zero() {
+        let scales = Scales::<2> {
+            torque: [3.0; 2],
+            speed: [0.5; 2],
+            position: [0.4; 2],
+            travel: [[-2.0, -0.5], [0.2, 1.2]],
+            inertia: [1.0; 2],
+            period: 0.002,
+            length: 0.3,
+            gravity: 9.81,
+        };
+        let near = |a: Option<[f64; 3]>, b: [f64; 3]| {
+            let a = a.unwrap();
+            assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-12), "{a:?} {b:?}");
+        };
+        near(scales.stop_towards_zero(0, 0.9), [-0.65, -20.0, 0.6]);
+        near(scales.stop_towards_zero(1, -0.9), [0.3, -30.0, 0.6]);
+        assert_eq!(scales.stop_towards_zero(0, 0.5), None);
+        assert_eq!(scales.initial_guess(Quantity::Reach, 0, 0.9), None);
+        assert_eq!(scales.initial_guess(Quantity::Reach, 0, -0.9), Some(-1.8));
+    }
+}
