@@ -48,8 +48,7 @@ SHARP = 2e-3
 CONVERGED = 5e-4
 #: Speed [rad/s or m/s] from which a joint moves.
 MOVING = 0.02
-#: Share of what an effect does by which armgap's simulation may miss it; more of an
-#: asymmetry that is rounded at standstill or is not.
+#: Share of what an effect does by which armgap's simulation may miss it; more of an asymmetry that is rounded at standstill or is not.
 AGREE, OTHERWISE = 0.01, {"coulomb_asymmetry": 0.03}
 #: Effects of which the torque at another joint may change by more than at their own, relative to that joint's torque: what they change is part
 #: of the arm, or of both joints that a cable or a transmission couples.

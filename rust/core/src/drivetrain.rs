@@ -162,6 +162,17 @@ impl<T: Real, const N: usize> Drivetrain<T, N> {
         }
     }
 
+    /// Takes the rotors that [`Self::add_closed_rotors`] adds from an inertia matrix.
+    #[inline]
+    pub(crate) fn take_closed_rotors(&self, inertia: &mut InertiaMatrix<T, N>, latent: &LatentState<T, N>) {
+        for j in 0..N {
+            let Some(transmission) = &self.of[j] else { continue };
+            if latent.side[j] != T::zero() {
+                add_rotor_inertia(inertia, -transmission.inertia, &transmission.rotor_jacobian(j));
+            }
+        }
+    }
+
     /// Adds to an inertia matrix all rotors, as if each moved with its link.
     pub(crate) fn add_rotors(&self, inertia: &mut InertiaMatrix<T, N>) {
         for (j, transmission) in self.iter() {

@@ -86,8 +86,8 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> RigidArm<T, A, N,
         self.rotated(joints, rotated(sincos, &rotations))
     }
 
-    /// Load of each joint, N m (N), at the accelerations `ddq`, given the inertia matrix, which may hold further rotors, and the bias: the torque that
-    /// its transmission passes on to the link, or the bias where the arm's parameters do not tell that ([`Arm::ROTORS_APART`]).
+    /// Load of each joint, N m (N), at the accelerations `ddq`, given inertia matrix and bias of the arm without further rotors: the torque that its
+    /// transmission passes on to the link, or the bias where the arm's parameters do not tell that ([`Arm::ROTORS_APART`]).
     #[inline]
     pub fn loads(&self, equation_terms: &EquationTerms<T, N>, ddq: &[T; N]) -> [T; N] {
         let mut loads = equation_terms.bias;

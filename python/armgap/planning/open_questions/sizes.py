@@ -226,6 +226,6 @@ def levels(effect: str, joint: int | None, scales: Scales) -> list[dict[str, flo
     for side, seen, end in ((1.0, scales.seen_high[j], scales.high[j]), (-1.0, scales.seen_low[j], scales.low[j])):
         for position in map(float, seen + parts * (end - seen) if side * (end - seen) > 0 else ()):
             # The stiffness of a stop towards zero is negative.
-            signed = stiffness if side * position > 0 else -stiffness
+            signed = stiffness if (side > 0) == (position >= 0) else -stiffness
             found.append({"position": position, "stiffness": signed, "damping": damping})
     return found

@@ -320,9 +320,9 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
             } else if stuck[j] {
                 motion.motor_friction[j] = motion.friction_at_rest[j];
             } else {
-                let dq = kinematics.joints.dq[j];
-                let x =
-                    self.point(j, t, kinematics.joints.q[j], dq, tau[j], kinematics.equation_terms.bias[j]);
+                let JointState { q, dq } = kinematics.joints;
+                let load = self.rigid.loads(&kinematics.equation_terms, &motion.ddq.into())[j];
+                let (dq, x) = (dq[j], self.point(j, t, q[j], dq[j], tau[j], load));
                 motion.motor_friction[j] = self.rigid.viscous[j] * dq + self.dry_friction(j, &x, modes[j]);
             }
         }
@@ -352,7 +352,12 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
             let JointState { q, dq } = &kinematics.joints;
             let velocity = dq[j] + latent.deflection_rate[j];
             let at = q[j] + latent.deflection[j];
-            let x = self.point(j, t, at, velocity, tau[j], kinematics.equation_terms.bias[j]);
+            let load = if A::ROTORS_APART {
+                self.drivetrain.transmitted(j, latent)
+            } else {
+                kinematics.equation_terms.bias[j]
+            };
+            let x = self.point(j, t, at, velocity, tau[j], load);
             braked[j] = self.rigid.viscous[j] * velocity + self.dry_friction(j, &x, modes[j]);
         }
         braked

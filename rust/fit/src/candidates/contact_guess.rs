@@ -26,7 +26,7 @@ const CONTACT_EXPLAINED_SHARE: f64 = 0.3;
 /// Speed below which friction is regularised in the search for contacts, relative to the RMS speed of the slowest joint.
 const REGULARISATION_SPEED: f64 = 0.02;
 
-/// Guess of a contact: position (rad or m), stiffness (N m/rad or N/m; negative for a stop towards zero) and damping (N m s/rad or N s/m).
+/// Guess of a contact: position, rad or m, stiffness, N m/rad or N/m, negative for a stop towards zero, and damping, N m s/rad or N s/m.
 pub type ContactGuess = [f64; 3];
 
 /// Position (rad or m), velocity (rad/s or m/s) and residual torque (N m or N) of a joint at one sample.
@@ -40,8 +40,8 @@ struct ContactSample {
 /// Factor from the fitted stiffness of a contact to a second, stiffer guess: an impact shorter than the local cubic appears softer than it is.
 const HARDER: f64 = 8.0;
 
-/// Guesses of contacts from the residual torque of logs under a model, per joint: at most one contact at either end of the travel, each with its fitted
-/// stiffness and a stiffer one; `speed` is the RMS speed per joint, rad/s or m/s.
+/// Guesses of contacts from the residual torque of logs under a model, per joint: at most one contact at either end of the travel, each with its
+/// fitted stiffness and a stiffer one; `speed` is the RMS speed per joint, rad/s or m/s.
 pub fn contact_guesses<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     tracks: &[Track<N>],
     arm: &A,
@@ -78,17 +78,17 @@ fn both(samples: &mut [ContactSample], side: f64) -> Vec<ContactGuess> {
     vec![guess, [position + depth - shallower, HARDER * stiffness, HARDER.sqrt() * damping]]
 }
 
-/// Contact at one end of the travel (`side` = 1 or -1) whose spring and damper explain most of a joint's squared residual torque. An end beyond zero
-/// has its stop beyond zero too; where all of the travel lies on the other side of zero, the stop lies towards zero.
+/// Contact at one end of the travel (`side` = 1 or -1) whose spring and damper explain most of a joint's squared residual torque. It lies in the
+/// end's half of the travel, or between the end and zero.
 fn hinge(samples: &mut [ContactSample], side: f64) -> Option<ContactGuess> {
     samples.sort_by(|a, b| (side * b.q).total_cmp(&(side * a.q)));
-    let beyond_zero = samples.first().is_some_and(|s| side * s.q > 0.0);
+    let middle = 0.5 * (samples.first()?.q + samples.last()?.q);
     let most = (MAX_CONTACT_SHARE * samples.len() as f64) as usize;
     let counts = std::iter::successors(Some(FEWEST_CONTACT_SAMPLES), |n| {
         Some(((*n as f64 * GROWTH) as usize).max(n + 1))
     });
     let tried = counts.take_while(|n| *n < most).filter_map(|n| {
-        let position = samples.get(n).map(|s| s.q).filter(|q| q * side > 0.0 || !beyond_zero)?;
+        let position = samples.get(n).map(|s| s.q).filter(|q| q * side > 0.0 || (q - middle) * side > 0.0)?;
         let (beyond, _) = samples.split_at(n);
         let ([stiffness, damping], gain) = spring(beyond, position, side)?;
         Some(([position, stiffness * side * position.signum(), damping], gain))

@@ -65,10 +65,11 @@ pub fn effect_instances<const N: usize>(
                         None => reached = false,
                     }
                 }
+                if effect.is_contact() {
+                    let towards_zero = scales.stop_towards_zero(joint, initial_guess[0]);
+                    all.extend(towards_zero.map(|p| EffectInstance { p, ..effect }));
+                }
                 if !reached {
-                    let share = initial_guess[0];
-                    let towards_zero = effect.is_contact().then(|| scales.stop_towards_zero(joint, share));
-                    all.extend(towards_zero.flatten().map(|p| EffectInstance { p, ..effect }));
                     continue;
                 }
                 if !law.has_transmission() {

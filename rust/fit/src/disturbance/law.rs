@@ -118,8 +118,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         best
     }
 
-    /// Trials of the effect `law` on a joint in the place of pushes that it could have caused; one trial per sign of the effect's first parameter, as
-    /// a stop has one side.
+    /// Trials of the effect `law` on a joint in the place of pushes that it could have caused; one trial per side of a stop, or sign of
+    /// another effect's first parameter.
     fn trials(&self, joint: usize, law: &'static LawGuess, disturbances: &[Disturbance]) -> Vec<Trial> {
         let Some(effect) = find::<f64>(law.name) else { return Vec::new() };
         let guess = |e: &Disturbance| {
@@ -130,7 +130,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         };
         let guessed: Vec<Option<EffectInstance>> = disturbances.iter().map(guess).collect();
         let of_side = |side: f64| {
-            let ours = |e: &Option<EffectInstance>| e.is_some_and(|e| e.p[0] * side > 0.0);
+            let own = |e: EffectInstance| e.law.edge(&e.p).map_or(e.p[0], |edge| edge.side);
+            let ours = |e: &Option<EffectInstance>| e.is_some_and(|e| own(e) * side > 0.0);
             let guesses: Vec<EffectInstance> =
                 guessed.iter().filter(|e| ours(e)).flatten().copied().collect();
             let pushes = disturbances.iter().cloned().zip(&guessed);
@@ -262,8 +263,8 @@ fn limit_guess(motion: &PushedMotion<'_>) -> Option<[f64; MAX_PARAMETERS]> {
     Some([low, 0.0, 0.0])
 }
 
-/// First guess (position, stiffness, damping) of a stop that could have caused a push towards zero position: entered when the push begins, left when
-/// it ends, with the stiffness that the greatest depth requires.
+/// First guess (position, stiffness, damping) of a stop that could have caused a push towards zero position, or away from it where the joint stays on
+/// one side of zero: entered when the push begins, left when it ends, with the stiffness that the greatest depth requires.
 fn stop_guess(motion: &PushedMotion<'_>) -> Option<[f64; MAX_PARAMETERS]> {
     let [impulse, time, duration] = motion.push;
     let side = -impulse.signum();
@@ -276,11 +277,14 @@ fn stop_guess(motion: &PushedMotion<'_>) -> Option<[f64; MAX_PARAMETERS]> {
     let deepest = inside.map(|(_, q)| side * q).fold(f64::NEG_INFINITY, f64::max);
     let position = 0.5 * (at(time - half) + at(time + half));
     let depth = deepest - position;
-    if !(position > 0.0 && depth > 0.0) {
+    let is_one_sided = motion.q.iter().all(|q| side * q < 0.0);
+    if !((position > 0.0 || is_one_sided) && depth > 0.0) {
         return None;
     }
     let torque = impulse.abs() / duration;
-    Some([side * position, HALF_SINE * torque / depth, DAMPED * torque * half / depth])
+    let stiffness = HALF_SINE * torque / depth;
+    let signed = if position > 0.0 { stiffness } else { -stiffness };
+    Some([side * position, signed, DAMPED * torque * half / depth])
 }
 
 /// Whether a fitted stop acts elastically during a push: its largest elastic torque is a considerable part of its largest damping torque. An effect
@@ -289,11 +293,12 @@ fn is_elastic(
     &[position, stiffness, damping, ..]: &[f64; MAX_PARAMETERS],
     motion: &PushedMotion<'_>,
 ) -> bool {
-    let depth = |q: &f64| position.signum() * (q - position);
+    let side = position.signum() * stiffness.signum();
+    let depth = |q: &f64| side * (q - position);
     let deepest = motion.q.iter().map(depth).fold(0.0, f64::max);
     let rates = motion.t.windows(2).zip(motion.q.windows(2)).filter(|(_, q)| depth(&q[1]) > 0.0);
     let fastest = rates.map(|(t, q)| (q[1] - q[0]).abs() / (t[1] - t[0]).max(1e-9)).fold(0.0, f64::max);
-    stiffness * deepest > ELASTIC * damping * fastest
+    stiffness.abs() * deepest > ELASTIC * damping * fastest
 }
 
 #[cfg(test)]
@@ -357,6 +362,7 @@ mod tests {
         let torque = vec![0.0; t.len()];
         let motion = PushedMotion { push: [-0.1, TIME, 0.1], t: &t, q: &q, torque: &torque };
         assert!(is_elastic(&[0.5, 100.0, 0.5], &motion));
+        assert!(!is_elastic(&[0.7, -0.01, 0.1], &motion), "towards zero");
         assert!(!is_elastic(&[0.5, 0.01, 0.1], &motion));
         assert!(!is_elastic(&[0.7, 100.0, 0.5], &motion), "a position that is never reached");
     }

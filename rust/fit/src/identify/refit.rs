@@ -1,7 +1,7 @@
 //! The arm's parameters re-estimated without any effect, under the arm file's standard deviations as prior.
 //!
-//! The plausibility checks of the input compare a log as it stands with the log after correction of a defect. The fit also starts from parameters that a
-//! linear regression finds (`DiagnosisContext::settle_rigid`), as an arm with an unknown load or a wrong arm file requires.
+//! The plausibility checks of the input compare a log as it stands with the log after correction of a defect. The fit also starts from parameters
+//! that a linear regression finds (`DiagnosisContext::settle_rigid`), as an arm with an unknown load or a wrong arm file requires.
 
 use crate::diagnose::Request;
 use crate::log::input::{DiagnoseError, LogData, Options, validate};

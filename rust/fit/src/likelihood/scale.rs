@@ -134,16 +134,15 @@ impl<const N: usize> Scales<N> {
         }
     }
 
-    /// Initial guess of a stop towards zero at one end of joint `j`'s travel, all of which lies on the other side of zero: position, stiffness
-    /// (negative) and damping. The stop lies inside the travel by the part that `share`, negative for the lower end, leaves to one; `None` where
-    /// it would lie beyond the middle.
+    /// Initial guess of a stop towards zero at one end of joint `j`'s travel: position, stiffness (negative) and damping. The stop lies inside the
+    /// travel by the part that `share`, negative for the lower end, leaves to one; `None` where it would lie beyond the middle, or away from zero.
     pub fn stop_towards_zero(&self, j: usize, share: f64) -> Option<[f64; 3]> {
         let [low, high] = self.travel[j];
-        let inside = 1.0 - share.abs();
-        let depth = inside * (high - low);
+        let depth = (1.0 - share.abs()) * (high - low);
         let position = if share > 0.0 { high - depth } else { low + depth };
-        let push = self.torque[j];
-        (inside < 0.5).then(|| [position, -push / depth, STOP_DAMPING * push / self.speed[j]])
+        let push = self.size(Quantity::Torque, j);
+        let sought = depth > 0.0 && 2.0 * depth < high - low && position * share < 0.0;
+        sought.then(|| [position, -push / depth, STOP_DAMPING * push / self.size(Quantity::Speed, j)])
     }
 
     /// Value from which a parameter's size is counted: its neutral value, or zero if it has none; for a rest position the middle of the travel.
@@ -204,6 +203,7 @@ mod tests {
         near(scales.stop_towards_zero(0, 0.9), [-0.65, -20.0, 0.6]);
         near(scales.stop_towards_zero(1, -0.9), [0.3, -30.0, 0.6]);
         assert_eq!(scales.stop_towards_zero(0, 0.5), None);
+        assert_eq!(scales.stop_towards_zero(0, -0.9), None);
         assert_eq!(scales.initial_guess(Quantity::Reach, 0, 0.9), None);
         assert_eq!(scales.initial_guess(Quantity::Reach, 0, -0.9), Some(-1.8));
     }

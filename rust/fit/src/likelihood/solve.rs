@@ -225,7 +225,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> FitProblem<'_, A, N, P> 
             let now = at.hypothesis.values();
             let mut fall = None;
             for _ in 0..6 {
-                let values = inside(&now, step(&normal, &gradient, damping, &now, &lower, &upper), &lower, P);
+                let next = step(&normal, &gradient, damping, &now, &lower, &upper);
+                let values = inside(&now, next, [&lower, &upper], P);
                 let change = DVector::from_fn(now.len(), |i, _| values[i] - now[i]);
                 let foreseen = change.dot(&(2.0 * &gradient - &normal * &change));
                 if jacobian.is_reused && foreseen < MIN_PREDICTED_DECREASE * effort.enough * at.cost() {
@@ -310,12 +311,15 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> FitProblem<'_, A, N, P> 
     }
 }
 
-/// Values `next` after a step from the values `now`; those from index `free` on move by at most nine tenths of the distance to their lower bound,
-/// because an effect whose amplitude reaches zero has zero derivatives and could not return.
-fn inside(now: &[f64], mut next: Vec<f64>, lower: &[f64], free: usize) -> Vec<f64> {
+/// Values `next` after a step from the values `now`; those from index `free` on move by at most nine tenths of the distance to their lower bound, or
+/// to an upper bound at zero, because an effect whose amplitude reaches zero has zero derivatives and could not return.
+fn inside(now: &[f64], mut next: Vec<f64>, [lower, upper]: [&[f64]; 2], free: usize) -> Vec<f64> {
     for i in free..next.len() {
         if lower[i].is_finite() {
             next[i] = next[i].max(lower[i] + 0.1 * (now[i] - lower[i]));
+        }
+        if upper[i] < 0.0 {
+            next[i] = next[i].min(upper[i] - 0.1 * (upper[i] - now[i]));
         }
     }
     next

@@ -73,7 +73,7 @@ impl EffectInstance {
         let parameter = &self.law.spec().parameters[i];
         let [lower, upper] = [parameter.lower, parameter.upper];
         match parameter.quantity {
-            Quantity::ContactStiffness if self.p[i] < 0.0 => [lower, upper.min(0.0)],
+            Quantity::ContactStiffness if self.p[i] < 0.0 => [lower, upper.min(-f64::MIN_POSITIVE)],
             Quantity::ContactStiffness => [lower.max(0.0), upper],
             _ => [lower, upper],
         }

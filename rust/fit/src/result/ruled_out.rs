@@ -218,7 +218,8 @@ mod tests {
     use super::*;
     use armgap_core::effect::find;
 
-    /// Score test of backlash with the estimated size `estimate` (1: that of the trial), standard deviation 0.1, or 2 where no trial size was reached.
+    /// Score test of backlash with the estimated size `estimate` (1: that of the trial), standard deviation 0.1, or 2 where no trial size was
+    /// reached.
     fn of_backlash(estimate: f64, reached: bool) -> RuledOut {
         let effect = EffectInstance::new(find::<f64>("backlash").unwrap(), 0, [0.01, 0.0, 0.0]);
         let information_sigma = if reached { 0.1 } else { 2.0 };

@@ -55,8 +55,8 @@ pub const RIVAL_FINALISTS: usize = 3;
 /// Largest number of laws without a name, tables over one variable each, that results list.
 pub const MOST_TABLES: usize = 3;
 
-/// Exponent, in the odds that a cause is no substitute for something else, of the squared holdout residuals that a table in the cause's place leaves, relative to those that the cause
-/// leaves; as for arms in a plane (`search::evidence`).
+/// Exponent, in the odds that a cause is no substitute for something else, of the squared holdout residuals that a table in the cause's place leaves,
+/// relative to those that the cause leaves; as for arms in a plane (`search::evidence`).
 pub const RIVAL_POWER: i32 = 4;
 
 /// Largest number of Gauss-Newton iterations in which the parameters of a model's terms are fitted; twelve iterations give the same diagnoses.

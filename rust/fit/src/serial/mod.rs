@@ -285,6 +285,8 @@ fn candidates<const N: usize, const P: usize>(
             continue;
         }
         match groups.iter_mut().find(|group| group[0].same_place(&term)) {
+            // A law that is linear in all of its parameters is tested at all of their values.
+            Some(_) if term.amplitudes() == term.p.len() => {}
             Some(group) => group.push(term),
             None => groups.push(vec![term]),
         }

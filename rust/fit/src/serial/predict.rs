@@ -4,7 +4,7 @@ use crate::log::track::LARGEST_ERROR;
 use crate::model::hypothesis::Hypothesis;
 use crate::predict::window::{Dataset, Window};
 use crate::serial::controller::closed_loop::ClosedLoop;
-use crate::serial::term::row_term::{RowTerm, torques_of_rows, without_rows};
+use crate::serial::term::row_term::{RowTerm, torques_of_rows, without};
 use crate::serial::term::{Term, TermKind, of_load};
 use armgap_core::arm::Arm;
 use armgap_core::chain::Chain;
@@ -24,8 +24,14 @@ impl<const N: usize, const P: usize> Model<N, P> {
     pub fn new(arm: &Chain<f64, N>, theta: [f64; P], terms: &[Term]) -> Self {
         let mut model =
             Self { arm: *arm, hypothesis: Hypothesis::rigid(theta), closed_loop: None, rows: Vec::new() };
-        for term in terms.iter().flat_map(Term::members) {
+        let members: Vec<Term> = terms.iter().flat_map(Term::members).collect();
+        // Rotors come first, as shafts and backlash take them over.
+        for effect in members.iter().filter_map(Term::effect) {
+            model.hypothesis.theta[10 * N + effect.joint] += effect.law.inertia(&effect.p);
+        }
+        for term in members {
             match term.kind {
+                TermKind::Law(effect) if effect.law.inertia(&effect.p) != 0.0 => {}
                 TermKind::Law(_) => model.hypothesis.effects.extend(term.effect()),
                 TermKind::Payload => model.add(N - 1, &of_load(&term.p)),
                 TermKind::NominalLink(link) => model.add(link, &std::array::from_fn(|i| term.p[i])),
@@ -33,14 +39,14 @@ impl<const N: usize, const P: usize> Model<N, P> {
                 TermKind::Transmission(law) if term.p[0] > 0.0 => {
                     let j = law.joint;
                     let inertia = arm.inertia(&theta, &SVector::zeros())[(j, j)];
-                    let (effect, taken) = law.instance(&term.p, theta[10 * N + j], inertia);
+                    let (effect, taken) = law.instance(&term.p, model.hypothesis.theta[10 * N + j], inertia);
                     model.hypothesis.theta[10 * N + j] -= taken;
                     model.hypothesis.effects.push(effect);
                 }
                 TermKind::BaseTilt => model.arm = turned(&model.arm, [term.p[0], term.p[1]]),
                 TermKind::Row(row) => model.rows.push((row, term.p)),
-                // Tables are compared with causes in the weak form only, controllers are in the closed loop, and the members of a term on several joints
-                // are visited one by one.
+                // Tables are compared with causes in the weak form only, controllers are in the closed loop, and the members of a term on several
+                // joints are visited one by one.
                 TermKind::Controller(_)
                 | TermKind::Joints(_)
                 | TermKind::Table(_)
@@ -63,19 +69,22 @@ impl<const N: usize, const P: usize> Model<N, P> {
 
     /// Predicted positions of all windows of `data`, rad or m, sample by sample and joint by joint.
     pub fn predict(&self, data: &Dataset<N>) -> Vec<f64> {
-        if let Some(closed_loop) = &self.closed_loop {
-            let beside: Vec<Vec<[f64; N]>> = match self.rows.as_slice() {
-                [] => Vec::new(),
-                rows => data.tracks.iter().map(|track| torques_of_rows(track, rows)).collect(),
-            };
-            return closed_loop.predict(data, &self.arm, &self.hypothesis, &beside);
-        }
         if self.rows.is_empty() {
-            return data.predict_singly(&self.arm, &self.hypothesis);
+            return self.predict_beside(data, &[]);
         }
-        let tracks = data.tracks.iter().map(|track| without_rows(track, &self.rows)).collect();
-        let beside = Dataset { tracks, windows: data.windows.clone(), rows: data.rows };
-        beside.predict_singly(&self.arm, &self.hypothesis)
+        let torques: Vec<Vec<[f64; N]>> =
+            data.tracks.iter().map(|track| torques_of_rows(track, &self.rows)).collect();
+        let tracks = data.tracks.iter().zip(&torques).map(|(track, by)| without(track, by)).collect();
+        self.predict_beside(&Dataset { tracks, windows: data.windows.clone(), rows: data.rows }, &torques)
+    }
+
+    /// Predicted positions, like [`Self::predict`], where the logged torques of `data` are already less the torques `rows` of coupled joints, N m or
+    /// N, by log and sample interval.
+    fn predict_beside(&self, data: &Dataset<N>, rows: &[Vec<[f64; N]>]) -> Vec<f64> {
+        match &self.closed_loop {
+            Some(closed_loop) => closed_loop.predict(data, &self.arm, &self.hypothesis, rows),
+            None => data.predict_singly(&self.arm, &self.hypothesis),
+        }
     }
 }
 

@@ -184,7 +184,8 @@ struct Along<'a, const N: usize> {
     beside: Option<&'a [[f64; N]]>,
 }
 
-/// Simulates one window of a log, from a state at its start, and writes the predicted positions, rad or m, sample by sample and joint by joint, into `positions`.
+/// Simulates one window of a log, from a state at its start, and writes the predicted positions, rad or m, sample by sample and joint by joint, into
+/// `positions`.
 fn run<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     plant: &Plant<f64, A, N, P>,
     hypothesis: &Hypothesis<P>,

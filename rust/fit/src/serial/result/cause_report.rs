@@ -8,7 +8,7 @@ use crate::serial::controller::PositionController;
 use crate::serial::result::controller_report::behind_controller;
 use crate::serial::search::{Found, Tested};
 use crate::serial::term::transmission::TransmissionLaw;
-use crate::serial::term::{Term, TermKind};
+use crate::serial::term::{Term, TermKind, TermParameter};
 use armgap_core::effect::{Effect, Scope, Trial, catalogue};
 
 /// One-sided 95 % quantile of the standard normal distribution, for upper confidence limits of the sizes of effects.
@@ -59,7 +59,7 @@ fn cause_values(term: &Term, sigma: &[f64], rotary: &[bool]) -> Named<CauseValue
 
 fn named_values(term: &Term, sigma: &[f64], rotary: &[bool]) -> Named<Value> {
     let parameters = term.parameters(rotary_of(term, rotary));
-    let value = |(i, p): (usize, &crate::serial::term::TermParameter)| {
+    let value = |(i, p): (usize, &TermParameter)| {
         let sigma = sigma.get(i).copied().filter(|s| s.is_finite()).unwrap_or(0.0);
         match p.inverse {
             Some((name, unit)) if term.p[i] != 0.0 => {
@@ -185,7 +185,10 @@ fn status(found: &Found, unexplained: &[Option<f64>], tested: &Tested, rotary: &
     let bound = (term.amplitudes() > 0 && !matches!(term.kind, TermKind::NominalLink(_)))
         .then(|| {
             let p = parameters.first()?;
-            let value = (largest * (term.p[0] - p.neutral)).abs();
+            // Several amplitudes are those of one wave: the bound is on its amplitude.
+            let apart = |(value, p): (&f64, &TermParameter)| (value - p.neutral).powi(2);
+            let size = term.p.iter().zip(&parameters).take(term.amplitudes()).map(apart).sum::<f64>().sqrt();
+            let value = (largest * size).abs();
             value.is_finite().then_some(Bound { parameter: p.name, value, unit: p.unit, level: 0.95 })
         })
         .flatten();

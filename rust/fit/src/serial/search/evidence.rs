@@ -110,8 +110,8 @@ impl Search<'_> {
     }
 
     /// Twice the logarithm of the likelihood ratio of the models `with` and `without` a term on the training logs, where the variance of each joint's
-    /// residuals is estimated with either model, at least as that of the position noise: `n log(v0 / v1)` over the joints (Seber and Lee 2003, section
-    /// 4.2), with `n` the number of independent rows of the model without the term.
+    /// residuals is estimated with either model, at least as that of the position noise: `n log(v0 / v1)` over the joints (Seber and Lee 2003,
+    /// section 4.2), with `n` the number of independent rows of the model without the term.
     fn likelihood_ratio(&self, regression: &Regression, [without, with]: [&Fitted; 2]) -> f64 {
         let rows = self.training.rows();
         let floor = floor(rows, &regression.weights);

@@ -182,7 +182,7 @@ impl Search<'_> {
             let by = if *p == 0.0 || b.neutral == 0.0 && p.abs() < by.abs() && term.amplitudes() > 0 {
                 by
             } else if term.amplitudes() == 0 && p.abs() > 0.0 {
-                by.clamp(-0.5 * p.abs(), p.abs())
+                p.signum() * (p.signum() * by).clamp(-0.5 * p.abs(), p.abs())
             } else {
                 by
             };

@@ -47,8 +47,8 @@ pub struct Search<'a> {
     pub rotary: Vec<bool>,
     /// Sample period, s. A delay or lag below it is an artefact of how torques and positions were sampled, and is not named.
     pub period: f64,
-    /// Function that tells whether the inertia matrix along the logs, at given parameters of the arm and without the rotors of given joints (from 0), is
-    /// conditioned well enough for simulation (`CONDITIONED`).
+    /// Function that tells whether the inertia matrix along the logs, at given parameters of the arm and without the rotors of given joints (from 0),
+    /// is conditioned well enough for simulation (`CONDITIONED`).
     pub is_feasible: &'a (dyn Fn(&[f64], &[usize]) -> bool + Sync),
     /// Reporter of the search's progress, through which the search may be cancelled.
     pub progress: &'a ProgressReporter,

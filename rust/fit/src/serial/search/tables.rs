@@ -84,7 +84,8 @@ impl Search<'_> {
         Some((term, excess))
     }
 
-    /// The model of least [`Fitted::total`] with one more table, accepted for what it explains, on one of `joints` (from 0); `None` where no table is accepted.
+    /// The model of least [`Fitted::total`] with one more table, accepted for what it explains, on one of `joints` (from 0); `None` where no table is
+    /// accepted.
     fn with_table(
         &self,
         regression: &Regression,
@@ -106,8 +107,8 @@ impl Search<'_> {
             .min_by(|a, b| a.total().total_cmp(&b.total()))
     }
 
-    /// The model `without` a cause, with the table in the cause's place that explains most on the joints (from 0) that the cause acts on; `None` where
-    /// no table is accepted.
+    /// The model `without` a cause, with the table in the cause's place that explains most on the joints (from 0) that the cause acts on; `None`
+    /// where no table is accepted.
     pub(in crate::serial) fn rival_table(
         &self,
         regression: &Regression,

@@ -18,8 +18,8 @@ pub(in crate::serial) struct Forcing {
 }
 
 /// Deflection of an elastic shaft, rad (m), in the middle of each sample interval, and its mean rate over the interval, rad/s (m/s), from its
-/// `compliance`, rad/(N m) (m/N), and its retardation time (damping by stiffness), s; without inertia the deflection is its mean over the interval. The
-/// log begins at rest.
+/// `compliance`, rad/(N m) (m/N), and its retardation time (damping by stiffness), s; without inertia the deflection is its mean over the interval.
+/// The log begins at rest.
 pub(in crate::serial) fn of_shaft(forcings: &[Forcing], compliance: f64, retardation: f64) -> Vec<[f64; 2]> {
     let mut x = forcings.first().map_or(0.0, |first| compliance * first.torque);
     let mut rate = 0.0;
@@ -66,8 +66,8 @@ fn free_oscillation([x, rate]: [f64; 2], [square, decay]: [f64; 2], h: f64) -> [
     [x * even + (rate + decay * x) * odd, rate * even - (decay * rate + square * x) * odd]
 }
 
-/// Deflection in a backlash of `gap`, rad (m), in the middle of each sample interval, and its mean rate over the interval, rad/s (m/s). The log begins
-/// at rest on the flank that the first torque pushes to.
+/// Deflection in a backlash of `gap`, rad (m), in the middle of each sample interval, and its mean rate over the interval, rad/s (m/s). The log
+/// begins at rest on the flank that the first torque pushes to.
 pub(in crate::serial) fn in_gap(forcings: &[Forcing], gap: f64) -> Vec<[f64; 2]> {
     let half = 0.5 * gap;
     let mut x = forcings.first().map_or(0.0, |first| half.copysign(first.torque));

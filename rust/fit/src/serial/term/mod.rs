@@ -251,14 +251,13 @@ impl Term {
         }
     }
 
-    /// Value of an amplitude at which the torque per unit of this amplitude is computed: one, or the initial guess of an effect on measured positions,
-    /// whose torque is linear for small displacements only.
+    /// Value of an amplitude at which the torque per unit of this amplitude is computed: one, or the initial guess of an effect on measured
+    /// positions, whose torque is linear for small displacements only.
     pub fn unit(&self) -> f64 {
         match self.kind {
             TermKind::Law(effect) if effect.law.spec().hooks.measured => {
                 effect.p.iter().map(|p| p.abs()).fold(0.0, f64::max)
             }
-            TermKind::Joints(ref of) => of.members[0].unit(),
             _ => 1.0,
         }
     }

@@ -150,8 +150,8 @@ impl RowTerm {
     }
 }
 
-/// Torques of `rows`, terms on two coupled joints with their parameters, on the joints along the measured motion of a log, by sample interval, N m or N,
-/// as the integrator cannot simulate such terms.
+/// Torques of `rows`, terms on two coupled joints with their parameters, on the joints along the measured motion of a log, by sample interval, N m
+/// or N, as the integrator cannot simulate such terms.
 pub fn torques_of_rows<const N: usize>(track: &Track<N>, rows: &[(RowTerm, Vec<f64>)]) -> Vec<[f64; N]> {
     let of = |m: &Middle<N>| {
         let mut torques = [0.0; N];
@@ -165,11 +165,10 @@ pub fn torques_of_rows<const N: usize>(track: &Track<N>, rows: &[(RowTerm, Vec<f
     Intervals::new(track).middles.iter().map(of).collect()
 }
 
-/// A copy of a log with the torques of `rows` ([`torques_of_rows`]) subtracted from the motors' torques.
-pub fn without_rows<const N: usize>(track: &Track<N>, rows: &[(RowTerm, Vec<f64>)]) -> Track<N> {
+/// A copy of a log whose motors' torques are less the torques `by`, N m or N, by sample interval.
+pub fn without<const N: usize>(track: &Track<N>, by: &[[f64; N]]) -> Track<N> {
     let mut track = track.clone();
-    let torques = torques_of_rows(&track, rows);
-    for (segment, by) in track.held.iter_mut().flatten().zip(torques.iter().flatten()) {
+    for (segment, by) in track.held.iter_mut().flatten().zip(by.iter().flatten()) {
         let InputSegment { start, middle, end } = *segment;
         *segment = InputSegment { start: start - by, middle: middle - by, end: end - by };
     }

@@ -1,8 +1,8 @@
 //! Joint elasticity and backlash in the weak form: how a deflection between motor and link changes the equation of motion.
 //!
 //! The deflection between motor and link follows from the torque that the body without an encoder would need to move with the other
-//! ([`super::deflection`]). Where the encoder measures the motor, the link's position is the motor's less the deflection; where the encoder measures the
-//! link, the motor's position, at which rotor inertia and friction act, is the link's plus the deflection.
+//! ([`super::deflection`]). Where the encoder measures the motor, the link's position is the motor's less the deflection; where the encoder measures
+//! the link, the motor's position, at which rotor inertia and friction act, is the link's plus the deflection.
 
 use crate::model::hypothesis::EffectInstance;
 use crate::numeric::cache::Cache;
@@ -18,8 +18,8 @@ use armgap_core::transmission::Sides;
 use nalgebra::SVector;
 use rayon::prelude::*;
 
-/// Displacement of a joint, rad (m), and of its velocity, rad/s (m/s), in numerical derivatives of torques by the deflection of a transmission; torques
-/// are smooth functions of both.
+/// Displacement of a joint, rad (m), and of its velocity, rad/s (m/s), in numerical derivatives of torques by the deflection of a transmission;
+/// torques are smooth functions of both.
 const DISPLACEMENT: f64 = 1e-3;
 
 /// Time between the instants at which these derivatives are computed, s: between them a motion of 2 Hz bends them by less than a hundredth.
@@ -54,7 +54,8 @@ pub enum Compliance {
 /// Least and largest damping ratio of the rotor on its shaft in predictions: beyond them the estimate is taken as uncertain.
 const DAMPING: [f64; 2] = [0.02, 1.0];
 
-/// Natural frequencies of a joint's inertia on its shaft among the initial guesses of an elastic joint, rad/s: from the softest drives to those of which test
+/// Natural frequencies of a joint's inertia on its shaft among the initial guesses of an elastic joint, rad/s: from the softest drives to those of
+/// which test
 /// functions see only that the deflection follows the torque. Up to 60 rad/s neighbours still explain most of each other's deflection; beyond, the
 /// deflection is in proportion to the compliance, and steps of four are enough.
 const LINK_FREQUENCIES: [f64; 10] = [8.0, 12.0, 18.0, 27.0, 40.0, 60.0, 120.0, 240.0, 480.0, 960.0];
@@ -130,8 +131,8 @@ impl TransmissionLaw {
         damping.is_finite().then(|| [damping, own.hypot(scaled)])
     }
 
-    /// The effect that simulates a transmission with the parameters `p` of [`Self::parameters`], and the part of the arm file's rotor inertia that the
-    /// effect takes over; `rotor` is that rotor inertia and `inertia` the joint's inertia, kg m^2 (kg).
+    /// The effect that simulates a transmission with the parameters `p` of [`Self::parameters`], and the part of the arm file's rotor inertia that
+    /// the effect takes over; `rotor` is that rotor inertia and `inertia` the joint's inertia, kg m^2 (kg).
     pub fn instance(&self, p: &[f64], rotor: f64, inertia: f64) -> (EffectInstance, f64) {
         let size = p[0];
         let rotor_inertia = if rotor > 0.0 { rotor } else { ROTOR_SHARE * inertia };
