@@ -171,6 +171,24 @@ def test_mjcf_has_the_dynamics_of_the_model(kind: str, name: str) -> None:
     assert worst(expected, got) < EXACT
 
 
+@pytest.mark.parametrize(("position", "stiffness"), [(0.5, -60.0), (-0.5, -60.0), (-0.5, 60.0)])
+def test_the_sign_of_a_stops_stiffness_tells_its_side_in_mjcf(position: float, stiffness: float) -> None:
+    mj = pytest.importorskip("mujoco")
+    arm = make_arm("pendulum")
+    stop = ("contact", 1, {"position": position, "stiffness": stiffness, "damping": 0.0})
+    model = mj.MjModel.from_xml_string(correct(found(arm, stop), arm).render("mjcf"))
+    data = mj.MjData(model)
+    side = np.sign(position) * np.sign(stiffness)
+    expected, got = [], []
+    for q, dq, ddq in states(1):
+        push = side * abs(stiffness) * max(side * (q[0] - position), 0.0)
+        expected.append(torque(arm, arm.theta, q, dq, ddq, 0.0) + push)
+        data.qpos[:], data.qvel[:], data.qacc[:] = q, dq, ddq
+        mj.mj_inverse(model, data)
+        got.append(data.qfrc_inverse.copy())
+    assert worst(expected, got) < EXACT
+
+
 def test_a_coupling_of_a_remote_rotor_is_a_rotor_and_theta3() -> None:
     mj = pytest.importorskip("mujoco")
     arm, x = make_arm("two-link"), SIZES["rotor_coupling"]["inertia"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import polars as pl
@@ -20,6 +21,7 @@ from armgap.planning.dynamics import inverse_dynamics
 from armgap.planning.limits import MARGIN, TORQUE_MARGIN, limits_of
 from armgap.planning.motion import Motion, build, count, named
 from armgap.planning.open_questions.questions import asked, known_model, open_questions
+from armgap.planning.open_questions.sizes import levels
 from armgap.planning.outcome import settled
 from armgap.simulation import Effect
 from conftest import TABLE_ONE
@@ -85,6 +87,21 @@ def usual(arm: Arm, name: str = "fast multisine", duration: float = DURATION) ->
 
 
 # Motions
+
+
+def test_stops_beyond_the_diagnosed_range_lie_on_either_side_of_zero():
+    scales = SimpleNamespace(
+        seen_low=[-2.0], seen_high=[-1.0], low=[-3.0], high=[1.0], torque=[2.0], position=[0.5], speed=[1.0]
+    )
+    found = levels("contact", 1, scales)
+    for stop in found:
+        upper = (stop["position"] >= 0) == (stop["stiffness"] > 0)
+        assert upper == (stop["position"] > -1.0), stop
+    positions = [stop["position"] for stop in found]
+    assert min(positions) > -3.0
+    assert max(positions) < 1.0
+    assert {p > -1.0 for p in positions} == {True, False}
+    assert any(-1.0 < p < 0.0 for p in positions)
 
 
 @pytest.mark.parametrize("seed", range(12))
