@@ -36,6 +36,12 @@ impl Search<'_> {
         let probable = self.fit(regression, probable, &model.estimate.theta);
         let unnamed = self.unnamed(regression, &probable);
         let reported = self.feasible(regression, probable);
+        // Causes have the values with which the reported model predicts, as its parameters have.
+        for named in &mut named {
+            if let Some(term) = reported.terms.iter().find(|term| term.same_place(&named.term)) {
+                named.term = term.clone();
+            }
+        }
         let refit_feasible = self.feasible(regression, refit.clone());
         Found {
             refit,

@@ -363,6 +363,15 @@ mod tests {
     }
 
     #[test]
+    fn causes_have_the_values_of_the_model_that_predicts() {
+        let found = found(&[offset(0, 0.5), law("quadratic_drag", 1, 0.3)], 4);
+        for named in &found.named {
+            assert!(found.reported.terms.iter().any(|t| t.same_place(&named.term) && t.p == named.term.p));
+        }
+        assert_eq!((found.named.len(), found.reported.terms.len()), (2, 2));
+    }
+
+    #[test]
     fn no_more_decisions_are_taken_than_allowed() {
         assert!(found(&[offset(0, 0.5)], 0).named.is_empty());
         let truth = [offset(0, 0.5), law("quadratic_drag", 1, 0.6)];
