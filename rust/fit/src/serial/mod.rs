@@ -167,6 +167,9 @@ impl Request<'_> {
             conditioning(values) > constants::CONDITIONED * conditioning(&theta).max(0.0)
         };
         let mut candidates = candidates(&arm, &theta, &training.data.tracks, self.options.known_units);
+        if self.options.half_width.is_some() {
+            candidates.retain(|group| !constants::ROUNDED_BY_LOW_PASS.contains(&group[0].name()));
+        }
         if let Some(controller) = &controller {
             // What a controller commanded before the log is unknown, and with it which flank a motor begins on.
             for group in &mut candidates {

@@ -3,7 +3,7 @@
 use crate::result::report::{
     Bound, Cause, CauseValue, EquivalentSummary, Named, RuledOut, SeveralJoints, Status, Value, Values,
 };
-use crate::serial::constants::{CONSEQUENCE, NOTICED};
+use crate::serial::constants::{CONSEQUENCE, NOTICED, ROUNDED_BY_LOW_PASS};
 use crate::serial::controller::PositionController;
 use crate::serial::result::controller_report::behind_controller;
 use crate::serial::search::{Found, Tested};
@@ -22,6 +22,9 @@ const NOT_EXCITED: f64 = 0.2;
 const HIDES: f64 = 0.01;
 
 const NOT_TESTED: &str = "not tested on serial arms from such logs";
+
+/// Reason why an effect of [`ROUNDED_BY_LOW_PASS`] is neither named nor absent.
+const ROUNDED: &str = "not told from low-passed positions, whose friction is rounded at reversals";
 
 const LOOK_ALIKE: &str = "explains the torque along these logs as well";
 
@@ -124,10 +127,15 @@ pub(in crate::serial) fn ruled_out(
         let tested = found.tested.iter().map(|t| &t.term).chain(found.named.iter().map(|n| &n.term));
         tested.into_iter().any(|t| t.name() == name && t.row().is_none() && t.joints().contains(&(j + 1)))
     };
-    let is_disturbance = |law: &&&'static dyn Effect<f64>| {
-        law.spec().scope == Scope::Joint && law.spec().trial == Trial::Disturbance
+    let why = |law: &'static dyn Effect<f64>| {
+        let spec = law.spec();
+        match spec.trial {
+            _ if spec.scope != Scope::Joint => None,
+            Trial::Disturbance => Some(NOT_TESTED),
+            _ => ROUNDED_BY_LOW_PASS.contains(&spec.name).then_some(ROUNDED),
+        }
     };
-    for law in catalogue::<f64>().iter().filter(is_disturbance) {
+    for (law, why) in catalogue::<f64>().iter().filter_map(|law| Some((law, why(*law)?))) {
         let open = (0..rotary.len()).filter(|j| !is_tested(law.spec().name, *j));
         all.extend(open.map(|j| RuledOut {
             effect: law.spec().name,
@@ -135,7 +143,7 @@ pub(in crate::serial) fn ruled_out(
             on: SeveralJoints::default(),
             status: Status::Undecided,
             bound: None,
-            why: Some(NOT_TESTED.to_owned()),
+            why: Some(why.to_owned()),
         }));
     }
     all

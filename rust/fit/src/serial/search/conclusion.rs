@@ -17,7 +17,7 @@ impl Search<'_> {
         &self,
         guesses: &[Vec<Guess>],
         regression: &Regression,
-        [refit, model]: [Fitted; 2],
+        [refit, refit_feasible, model]: [Fitted; 3],
         refit_sigma: Vec<f64>,
         seed: u64,
     ) -> Found {
@@ -25,12 +25,6 @@ impl Search<'_> {
             (0..model.terms.len()).map(|i| self.named(guesses, regression, &model, i, seed)).collect();
         named.sort_by(|a, b| b.explained.total_cmp(&a.explained));
         let tested = self.tested(guesses, regression, &model);
-        // Costs of the re-estimated and of the final model are comparable only under the same weights of the rows.
-        let refit = if model.terms.is_empty() {
-            refit
-        } else {
-            self.fit(regression, Vec::new(), &refit.estimate.theta)
-        };
         let probable =
             named.iter().filter(|n| n.unfit(&self.rotary).is_none()).map(|n| n.term.clone()).collect();
         let probable = self.fit(regression, probable, &model.estimate.theta);
@@ -42,7 +36,6 @@ impl Search<'_> {
                 named.term = term.clone();
             }
         }
-        let refit_feasible = self.feasible(regression, refit.clone());
         Found {
             refit,
             refit_feasible,
@@ -57,7 +50,7 @@ impl Search<'_> {
 
     /// The model with its links' parameters moved towards the arm file's until the inertia matrix is well conditioned ([`Search::is_feasible`]), and
     /// with rotor inertias and friction estimated again.
-    fn feasible(&self, regression: &Regression, model: Fitted) -> Fitted {
+    pub(in crate::serial) fn feasible(&self, regression: &Regression, model: Fitted) -> Fitted {
         let apart: Vec<usize> = model.terms.iter().flat_map(Term::own_motors).collect();
         if (self.is_feasible)(&model.estimate.theta, &apart) {
             return model;

@@ -111,6 +111,7 @@ impl Search<'_> {
         let mut regression = Regression::reweighted(self.training.rows(), self.prior, &none);
         let mut model = self.fit(&regression, Vec::new(), &self.prior.theta);
         let refit = model.clone();
+        let refit_feasible = self.feasible(&regression, refit.clone());
         let sigma = regression.sigma();
         let guesses = self.guesses(&regression, &model.estimate);
         for _ in 0..most {
@@ -124,7 +125,7 @@ impl Search<'_> {
             let kept = model.terms.iter().filter(|term| !self.is_sampling(term)).cloned().collect();
             model = self.fit(&regression, kept, &model.estimate.theta);
         }
-        self.concluded(&guesses, &regression, [refit, model], sigma, seed)
+        self.concluded(&guesses, &regression, [refit, refit_feasible, model], sigma, seed)
     }
 
     /// The term whose addition gives the accepted model of least [`Fitted::total`]; `None` where no candidate is accepted.
