@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 
 import click
@@ -11,6 +13,7 @@ import polars as pl
 
 import armgap
 
+from .causes import Motion, torque_of, unknown
 from .least_squares import Array, Columns, model_of, names_of, regression, share_left, solve
 
 #: Column of the times [s].
@@ -75,9 +78,11 @@ def _compare(arm: armgap.Arm, urdf: Path, training: list[Path], holdout: list[Pa
     widths = np.array(answer["options"]["friction_widths"])
     model = model_of(urdf, joints)
 
-    def rows(files: list[Path]) -> list[tuple[Array, Array]]:
+    def rows(
+        files: list[Path], beside: Callable[[Motion], Array] | None = None, links: Array | None = None
+    ) -> list[tuple[Array, Array]]:
         logs = [_columns(pl.read_parquet(file), joints, factors) for file in files]
-        return [regression(model, part, cutoff=cutoff, widths=widths) for part in logs]
+        return [regression(model, part, cutoff=cutoff, widths=widths, beside=beside, links=links) for part in logs]
 
     learnt, scored = rows(training), rows(holdout)
     period = float(np.median(np.diff(pl.read_parquet(training[0])[TIME].to_numpy())))
@@ -99,6 +104,14 @@ def _compare(arm: armgap.Arm, urdf: Path, training: list[Path], holdout: list[Pa
             f"  {name:24} {100 * ours[j]:5.1f} %; least squares {100 * free[j]:5.1f} % (ratio {ours[j] / free[j]:.2f}), "
             f"with the arm file as prior {100 * prior[j]:5.1f} % ({ours[j] / prior[j]:.2f})"
         )
+    if open_effects := unknown(answer["causes"]):
+        click.echo(f"  with its causes: not scored, as the torque of {', '.join(open_effects)} is not known here")
+    elif answer["causes"]:
+        theta = values("with_causes")
+        beside = functools.partial(torque_of, answer["causes"])
+        left = share_left(rows(holdout, beside, theta[: 10 * len(joints)]), theta)
+        of_free = ", ".join(f"{100 * x:.1f} % ({x / least:.2f})" for x, least in zip(left, free, strict=True))
+        click.echo(f"  with its causes, and beside least squares: {of_free}")
     for cause in answer["causes"]:
         click.echo(f"  named: {cause['effect']} of joint {cause['joint']}, probability {cause['probability']:.2f}")
     said = sorted({(check["check"], check["joint"]) for check in answer["checks"]}, key=str)

@@ -6,6 +6,7 @@ the parameters are the weighted least squares solution of smallest norm in scale
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,6 +14,8 @@ import numpy as np
 import pinocchio
 import scipy.signal
 from numpy.typing import NDArray
+
+from .causes import Motion
 
 Array = NDArray[np.float64]
 
@@ -46,8 +49,18 @@ def names_of(n: int) -> list[str]:
     return links + [f"{name}{j + 1}" for name in DRIVE_PARAMETERS for j in range(n)]
 
 
-def regression(model: pinocchio.Model, log: Columns, *, cutoff: float, widths: Array) -> tuple[Array, Array]:
+def regression(
+    model: pinocchio.Model,
+    log: Columns,
+    *,
+    cutoff: float,
+    widths: Array,
+    beside: Callable[[Motion], Array] | None = None,
+    links: Array | None = None,
+) -> tuple[Array, Array]:
     """Return torques, shape (n_rows, n), and their regressor, shape (n_rows, n, 13 n), both low-passed at `cutoff` [Hz].
+
+    The torques are less those that `beside` gives along the motion, whose loads follow from the links' parameters `links`, shape (10 n,).
 
     Rows are resampled to an even spacing. `widths` [rad/s or m/s], shape (n,): dry friction changes its sign as tanh(dq / width), or as the
     sign where a width is zero. The first and last second are left out, where the filter has no data on one side.
@@ -77,6 +90,8 @@ def regression(model: pinocchio.Model, log: Columns, *, cutoff: float, widths: A
     joints = np.arange(n)
     for place, column in enumerate((ddq, dq, dry)):
         whole[:, joints, (10 + place) * n + joints] = column
+    if beside is not None and links is not None:
+        tau = tau - beside(Motion(q, dq, ddq, dry, tau, whole[:, :, : 10 * n] @ links))
     edge = round(1.0 / period)
     return smooth(tau)[edge:-edge], smooth(whole)[edge:-edge]
 
