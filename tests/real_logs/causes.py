@@ -36,11 +36,11 @@ TORQUES: dict[str, Callable[[Motion, int, dict[str, float]], Array]] = {
     "rotor_inertia": lambda x, j, p: p["inertia"] * x.ddq[:, j],
     "joint_spring": lambda x, j, p: p["k"] * (x.q[:, j] - p["q0"]),
     "quadratic_drag": lambda x, j, p: p["c"] * x.dq[:, j] * np.abs(x.dq[:, j]),
-    "coulomb_asymmetry": _dry(lambda x, j, p: p["delta"] * x.direction[:, j]),
+    "coulomb_asymmetry": _dry(lambda x, j, p: p["delta"] * np.sign(x.dq[:, j])),
     "load_dependent_friction": _dry(lambda x, j, p: p["mu"] * np.abs(x.load[:, j])),
     "stribeck": _dry(lambda x, j, p: p["amplitude"] * np.exp(-((x.dq[:, j] / p["velocity"]) ** 2))),
     "position_dependent_friction": _dry(lambda x, j, p: p["a"] * np.cos(x.q[:, j]) + p["b"] * np.sin(x.q[:, j])),
-    "gear_efficiency": _dry(lambda x, j, p: p["loss"] * np.maximum(x.tau[:, j] * x.direction[:, j], 0.0)),
+    "gear_efficiency": _dry(lambda x, j, p: p["loss"] * np.maximum(x.tau[:, j] * np.sign(x.dq[:, j]), 0.0)),
 }
 
 

@@ -310,8 +310,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     }
 
     /// Fits the arm without effects from the arm file's parameters and, where there are others to start from, from these too; returns the starting
-    /// point
-    /// and the fit with the smaller prediction errors on the training logs, by the geometric mean over their windows: an unmodelled effect, such as a
+    /// point and the fit with the smaller prediction errors on the training logs, by the geometric mean over their windows: an unmodelled effect, such as a
     /// drive that saturates, may make most of the RMS error in a few windows.
     ///
     /// The scale of the residual is estimated with the parameters, so the cost has several minima: where the arm file's parameters predict the logs

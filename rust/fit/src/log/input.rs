@@ -34,7 +34,8 @@ pub struct Options {
     /// Seed of the resampling behind probabilities and intervals.
     pub seed: u64,
     /// Half width of the test functions of a serial arm's equation of motion, s; `None` for the default. Logs that were low-passed before they were
-    /// written require a half width larger than that filter's.
+    /// written require a half width larger than that filter's. With a half width given, effects that a low-pass of friction resembles are not
+    /// tested.
     pub half_width: Option<f64>,
     /// Whether the unit of a serial arm's torques is known independently. Where it was inferred from the arm file's masses, logs cannot show that a
     /// mass is wrong too: loads, wrong links and gains are no candidates.

@@ -27,7 +27,8 @@ impl<const N: usize, const P: usize> Model<N, P> {
         let members: Vec<Term> = terms.iter().flat_map(Term::members).collect();
         // Rotors come first, as shafts and backlash take them over.
         for effect in members.iter().filter_map(Term::effect) {
-            model.hypothesis.theta[10 * N + effect.joint] += effect.law.inertia(&effect.p);
+            let rotor = &mut model.hypothesis.theta[10 * N + effect.joint];
+            *rotor = (*rotor + effect.law.inertia(&effect.p)).max(0.0);
         }
         for term in members {
             match term.kind {
@@ -38,7 +39,7 @@ impl<const N: usize, const P: usize> Model<N, P> {
                 // A shaft that does not twist is a rigid joint.
                 TermKind::Transmission(law) if term.p[0] > 0.0 => {
                     let j = law.joint;
-                    let inertia = arm.inertia(&theta, &SVector::zeros())[(j, j)];
+                    let inertia = arm.inertia(&model.hypothesis.theta, &SVector::zeros())[(j, j)];
                     let (effect, taken) = law.instance(&term.p, model.hypothesis.theta[10 * N + j], inertia);
                     model.hypothesis.theta[10 * N + j] -= taken;
                     model.hypothesis.effects.push(effect);

@@ -193,9 +193,10 @@ fn status(found: &Found, unexplained: &[Option<f64>], tested: &Tested, rotary: &
     let bound = (term.amplitudes() > 0 && !matches!(term.kind, TermKind::NominalLink(_)))
         .then(|| {
             let p = parameters.first()?;
-            // Several amplitudes are those of one wave: the bound is on its amplitude.
-            let apart = |(value, p): (&f64, &TermParameter)| (value - p.neutral).powi(2);
-            let size = term.p.iter().zip(&parameters).take(term.amplitudes()).map(apart).sum::<f64>().sqrt();
+            // Several amplitudes of one unit are those of one wave: the bound is on its amplitude.
+            let of_wave = parameters.iter().take(term.amplitudes()).take_while(|other| other.unit == p.unit);
+            let apart = |(p, value): (&TermParameter, &f64)| (value - p.neutral).powi(2);
+            let size = of_wave.zip(&term.p).map(apart).sum::<f64>().sqrt();
             let value = (largest * size).abs();
             value.is_finite().then_some(Bound { parameter: p.name, value, unit: p.unit, level: 0.95 })
         })

@@ -185,7 +185,7 @@ fn causes(
         } else {
             None
         };
-        n.unfit(rotary).or_else(|| against.map(str::to_owned))
+        n.unfit.clone().or_else(|| against.map(str::to_owned))
     };
     let (mut named, mut candidates) = (Vec::new(), Vec::new());
     for n in &found.named {

@@ -25,14 +25,14 @@ impl Search<'_> {
             (0..model.terms.len()).map(|i| self.named(guesses, regression, &model, i, seed)).collect();
         named.sort_by(|a, b| b.explained.total_cmp(&a.explained));
         let tested = self.tested(guesses, regression, &model);
-        let probable =
-            named.iter().filter(|n| n.unfit(&self.rotary).is_none()).map(|n| n.term.clone()).collect();
+        let probable = named.iter().filter(|n| n.unfit.is_none()).map(|n| n.term.clone()).collect();
         let probable = self.fit(regression, probable, &model.estimate.theta);
         let unnamed = self.unnamed(regression, &probable);
         let reported = self.feasible(regression, probable);
         // Causes have the values with which the reported model predicts, as its parameters have.
         for named in &mut named {
             if let Some(term) = reported.terms.iter().find(|term| term.same_place(&named.term)) {
+                named.sigma = self.sigma_of(regression, &reported, term);
                 named.term = term.clone();
             }
         }
@@ -107,19 +107,7 @@ impl Search<'_> {
         let acts_on: Vec<usize> = (0..self.rotary.len()).filter(|j| signal[*j].is_some()).collect();
         let wins = stability(model, &against, seed);
         let trust = trust(&without, model, &evidence, &self.floor(regression));
-        let columns = self.derivatives(std::slice::from_ref(&term), &model.estimate.theta);
-        let sigma = regression
-            .score(&model.estimate, &columns, &self.ridge_of(&term, columns.len(), regression))
-            .map_or_else(
-                || vec![f64::INFINITY; term.p.len()],
-                |score| {
-                    let covariance = regression.sandwich(&model.estimate.residual, &columns, &score);
-                    // The scatter over blocks does not contain the uncertainty of the arm file's values; the inverse of the information with their
-                    // prior does.
-                    let variance = |i: usize| covariance[(i, i)].max(score.inverse()[(i, i)]).max(0.0);
-                    (0..term.p.len()).map(|i| variance(i).sqrt()).collect()
-                },
-            );
+        let sigma = self.sigma_of(regression, model, &term);
         let mut alike: Vec<Term> = same.into_iter().map(|r| r.terms[last].clone()).collect();
         let including = self.candidates.iter().filter_map(|group| group.first());
         for other in including.filter(|other| other.includes(&term, self.rotary.len())) {
@@ -131,7 +119,22 @@ impl Search<'_> {
         let left = rival.map_or(1.0, |rival| left_by_rival(model, &rival, &self.floor(regression), &acts_on));
         let probability = wins * beside_rival(trust, left, RIVAL_POWER);
         let explained = without.estimate.cost - model.estimate.cost + evidence.holdout_gain;
-        Named { term, sigma, evidence, explained, probability, alike }
+        let mut named = Named { term, unfit: None, sigma, evidence, explained, probability, alike };
+        named.unfit = named.reason_against(&self.rotary);
+        named
+    }
+
+    /// Standard deviations of the parameters of `term`, one of the terms of `model`, SI; infinite where the logs do not determine them.
+    fn sigma_of(&self, regression: &Regression, model: &Fitted, term: &Term) -> Vec<f64> {
+        let columns = self.derivatives(std::slice::from_ref(term), &model.estimate.theta);
+        let ridge = self.ridge_of(term, columns.len(), regression);
+        let Some(score) = regression.score(&model.estimate, &columns, &ridge) else {
+            return vec![f64::INFINITY; term.p.len()];
+        };
+        let covariance = regression.sandwich(&model.estimate.residual, &columns, &score);
+        // The scatter over blocks does not contain the uncertainty of the arm file's values; the inverse of the information with their prior does.
+        let variance = |i: usize| covariance[(i, i)].max(score.inverse()[(i, i)]).max(0.0);
+        (0..term.p.len()).map(|i| variance(i).sqrt()).collect()
     }
 
     /// First-order tests, in addition to the terms of the model, of every candidate whose joint and effect are not in the model.

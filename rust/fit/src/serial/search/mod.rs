@@ -58,9 +58,11 @@ pub struct Search<'a> {
 /// look-alikes.
 #[derive(Debug, Clone)]
 pub struct Named {
-    /// Term of the final model, with fitted values.
+    /// Term of the final model, with the values of [`Found::reported`] if it is named, else those of the final model.
     pub term: Term,
-    /// Standard deviations of the term's parameters, SI.
+    /// Reason why the term is not named; `None` if it is.
+    pub unfit: Option<String>,
+    /// Standard deviations of the term's parameters at these values, SI.
     pub sigma: Vec<f64>,
     /// Evidence for the term: comparison of the models with and without it.
     pub evidence: Evidence,
@@ -366,9 +368,8 @@ mod tests {
     #[test]
     fn causes_have_the_values_of_the_model_that_predicts() {
         let found = found(&[offset(0, 0.5), law("quadratic_drag", 1, 0.3)], 4);
-        for named in &found.named {
-            assert!(found.reported.terms.iter().any(|t| t.same_place(&named.term) && t.p == named.term.p));
-        }
+        let predicts = |t: &Term| found.reported.terms.iter().any(|r| r.same_place(t) && r.p == t.p);
+        assert!(found.named.iter().all(|named| predicts(&named.term)));
         assert_eq!((found.named.len(), found.reported.terms.len()), (2, 2));
     }
 
@@ -465,8 +466,7 @@ mod tests {
 
     #[test]
     fn a_term_below_consequence_is_not_named() {
-        let tiny = 0.001;
-        assert!(found(&[offset(0, tiny)], 4).named.is_empty());
+        assert!(found(&[offset(0, 0.001)], 4).named.is_empty());
     }
 
     #[test]

@@ -5,8 +5,8 @@ use crate::serial::search::Named;
 use armgap_core::effect::NEVER;
 
 impl Named {
-    /// Reason why the term is not named as a cause; `None` if it is. `rotary` holds whether each joint is rotary.
-    pub fn unfit(&self, rotary: &[bool]) -> Option<String> {
+    /// Reason why the term is not named as a cause, from its probability and its values; `None` if it is. `rotary` holds whether each joint is rotary.
+    pub(in crate::serial) fn reason_against(&self, rotary: &[bool]) -> Option<String> {
         if self.probability < NAMED {
             return Some(format!(
                 "its probability is {:.2}; from {NAMED} on a cause is named",

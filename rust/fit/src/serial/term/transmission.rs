@@ -55,8 +55,7 @@ pub enum Compliance {
 const DAMPING: [f64; 2] = [0.02, 1.0];
 
 /// Natural frequencies of a joint's inertia on its shaft among the initial guesses of an elastic joint, rad/s: from the softest drives to those of
-/// which test
-/// functions see only that the deflection follows the torque. Up to 60 rad/s neighbours still explain most of each other's deflection; beyond, the
+/// which test functions see only that the deflection follows the torque. Up to 60 rad/s neighbours still explain most of each other's deflection; beyond, the
 /// deflection is in proportion to the compliance, and steps of four are enough.
 const LINK_FREQUENCIES: [f64; 10] = [8.0, 12.0, 18.0, 27.0, 40.0, 60.0, 120.0, 240.0, 480.0, 960.0];
 
