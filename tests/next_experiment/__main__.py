@@ -18,10 +18,10 @@ from .cases import CASES, Case, Reference, expected, log_of, multisine, play, po
 from .hypotheses_played import is_followed, played, used
 from .obtained import obtained
 from .sealed import draw
-from .summary import is_settled, summary
+from .summary import summary
 
-#: Text in a diagnosis about an equivalent that other motions may distinguish from the named effect.
-SEPARABLE = "other motions may separate them"
+#: What a first diagnosis may say of the hidden effect for it to be an open question: a wrong `absent` is a fault of the diagnosis, not of a motion.
+OPEN = ("undecided", "not excited", "candidate", "look-alike", "named, look-alikes")
 
 
 def named(diagnosis: armgap.Diagnosis, case: Case) -> tuple[str, float]:
@@ -31,7 +31,7 @@ def named(diagnosis: armgap.Diagnosis, case: Case) -> tuple[str, float]:
     """
     hidden = (case.effect, case.joint)
     for cause in diagnosis.causes:
-        alike = [(e.effect, e.joint) for e in cause.equivalents if SEPARABLE in (e.why or "")]
+        alike = [(e.effect, e.joint) for e in cause.equivalents if e.motion_separates]
         same = [(cause.effect, cause.joint), *((e.effect, e.joint) for e in cause.equivalents)]
         if hidden in same and hidden not in alike:
             return ("named, look-alikes" if alike else "named"), cause.probability
@@ -47,7 +47,7 @@ def named(diagnosis: armgap.Diagnosis, case: Case) -> tuple[str, float]:
 def one(case: Case, seed: int, duration: float, ask: bool) -> dict[str, Any] | None:
     """Diagnose a case from its small first motion, plan a motion, play plan and multisine, diagnose both; return the results as a record.
 
-    Return None where the first log of a sealed case already names the hidden effect, or the arm cannot follow its motion (unstable control).
+    Return None where the first log of a sealed case leaves no question about the hidden effect (`OPEN`), or the arm cannot follow its motion.
     """
     with tempfile.TemporaryDirectory() as name:
         arm, arm_file = write_arm(case, seed, Path(name))
@@ -56,7 +56,7 @@ def one(case: Case, seed: int, duration: float, ask: bool) -> dict[str, Any] | N
             return None
         first = log_of(small, "first")
         before = armgap.diagnose(first, arm_file)
-        if case.machine is not None and is_settled(named(before, case)):
+        if case.machine is not None and named(before, case)[0] not in OPEN:
             return None
         began = time.perf_counter()
         wanted = [case.asked] if ask else []
@@ -66,8 +66,9 @@ def one(case: Case, seed: int, duration: float, ask: bool) -> dict[str, Any] | N
         planned = Reference(open_plan.q_ref, open_plan.dq_ref, open_plan.tau_ff)
         result: dict[str, Any] = {"case": case.name, "seed": seed, "before": named(before, case), "seconds": seconds}
         own = [q for q in open_plan.questions if (q.effect, q.joint) == (case.effect, case.joint)]
-        result["promised"] = own[-1].settled if own else None
-        result["evidence"] = own[-1].expected_log_likelihood_ratio if own else None
+        result["promised"] = min((q.settled for q in own), default=None)
+        against_none = [q.expected_log_likelihood_ratio for q in own if q.against == "none"]
+        result["evidence"] = against_none[0] if against_none else None
         result["all"] = [
             (q.effect, q.joint, q.against, round(q.settled, 3), round(q.expected_log_likelihood_ratio, 1))
             for q in open_plan.questions
@@ -108,7 +109,7 @@ def sealed(options: argparse.Namespace) -> None:
         print(json.dumps(records[-1], default=float), flush=True)
         if options.json:
             options.json.write_text(json.dumps(records, indent=1, default=float), encoding="utf-8")
-    print(f"{settled} draws were left out, as their first log settles them or the arm does not follow it")
+    print(f"{settled} draws were left out, as their first log leaves no question or the arm does not follow it")
     print(summary(records))
 
 

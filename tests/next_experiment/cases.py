@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 import armgap
 from armgap.arm import MotionLimits
 from armgap.evidence.hypothesis import EffectInstance, Hypothesis
-from armgap.planning.criterion import HypothesisPair, PredictedMotion, Setting
+from armgap.planning.criterion import HypothesisPair, PredictedMotion, Rest, Setting
 from armgap.planning.dynamics import inverse_dynamics
 from armgap.planning.limits import MARGIN, TORQUE_MARGIN
 from armgap.planning.open_questions.questions import known_model
@@ -130,6 +130,15 @@ class Sampled:
         return found[0], found[1], found[2]
 
 
+def library_values(case: Case) -> dict[str, float]:
+    """Return the hidden effect's values as the library has them: with the rotor's share, which the simulator fixes, for backlash."""
+    if case.effect != "backlash":
+        return case.parameters
+    arm, j = case.machine or ARMS[case.arm], (case.joint or 1) - 1
+    share = BACKLASH_ROTOR * arm.inertia[j] / arm.joint_inertia[j]
+    return {"rotor_share": share, "riding": 0.0, **case.parameters}
+
+
 def expected(
     case: Case, before: armgap.Diagnosis, arm_file: Path, reference: Reference, threshold: float
 ) -> tuple[float, float]:
@@ -137,10 +146,13 @@ def expected(
     arm = armgap.Arm.read(arm_file)
     model, _ = known_model(before.to_dict(), arm)
     t = arm.sample_period * np.arange(len(reference.q))
-    played = PredictedMotion(Setting.of(before.to_dict(), model), Sampled(t, reference))  # type: ignore[arg-type]
     without = tuple(e for e in model.effects if (e.effect, e.joint) != (case.effect, case.joint))
-    hidden = EffectInstance(case.effect, case.joint, case.parameters)
-    outcome = played.outcome(HypothesisPair(((1.0, (*without, hidden)),), without))
+    hidden = EffectInstance(case.effect, case.joint, library_values(case))
+    setting = Setting.of(before.to_dict(), model)
+    # The true arm leaves noise alone.
+    noise = Rest.of(np.zeros(arm.n_joints), np.array(before.gap.floor))
+    played = PredictedMotion(setting, Sampled(t, reference))  # type: ignore[arg-type]
+    outcome = played.outcome(HypothesisPair(((1.0, (*without, hidden)),), without, rest=noise))
     return outcome.expected, outcome.settled(threshold)
 
 

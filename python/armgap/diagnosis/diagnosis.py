@@ -246,9 +246,7 @@ def _ambiguous_delay(data: dict[str, Any], training: list[Log], arm: Arm) -> lis
         return []
     for cause in data["causes"]:
         if cause["effect"] == "actuator_delay":
-            cause["equivalents"].append(
-                {"effect": "time_shift", "joint": None, "why": "torques early in the file by as much"}
-            )
+            cause["equivalents"].append(_beside("time_shift", None, "torques early in the file by as much"))
     return [check]
 
 
@@ -281,7 +279,12 @@ def _ambiguous_lag(data: dict[str, Any], checks: Sequence[Check]) -> None:
             cause["probability"] *= 0.5
             for joint in sorted(found):
                 why = f"q{joint} is smoother than its encoder: a low-pass before logging delays positions as much"
-                cause["equivalents"].append({"effect": "filtered_positions", "joint": joint, "why": why})
+                cause["equivalents"].append(_beside("filtered_positions", joint, why))
+
+
+def _beside(name: str, joint: int | None, why: str) -> dict[str, Any]:
+    """Return a defect of the log as an entry of a cause's equivalents; no motion tells it from the cause."""
+    return {"effect": name, "joint": joint, "why": why, "motion_separates": False}
 
 
 def _contradicted(data: dict[str, Any]) -> dict[str, Any]:

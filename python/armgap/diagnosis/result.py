@@ -157,11 +157,12 @@ class Location:
 
 @dataclass(frozen=True)
 class Equivalent:
-    """An effect that the logs do not distinguish from a named cause, with the reason `why`; `joints` and `row` as in `Cause`."""
+    """An effect that the logs do not tell from a cause, why, and whether another motion may; `joints` and `row` as in `Cause`."""
 
     effect: str
     joint: int | None
     why: str
+    motion_separates: bool = True
     joints: tuple[int, ...] | None = None
     row: tuple[int, int] | None = None
 
@@ -316,7 +317,7 @@ class ChainPart:
     detail: str
 
 
-_Record = TypeVar("_Record", Value, Bound, Sanity)
+_Record = TypeVar("_Record", Equivalent, Value, Bound, Sanity)
 
 
 @dataclass(frozen=True)
@@ -467,7 +468,7 @@ def _cause(data: dict[str, Any]) -> Cause:
         data["probability"],
         single,
         data["closed"],
-        tuple(Equivalent(e["effect"], e["joint"], e["why"], **_several(e)) for e in data["equivalents"]),
+        tuple(_take(Equivalent, e | _several(e)) for e in data["equivalents"]),
         data.get("log"),
         data.get("why"),
         data.get("sides"),

@@ -14,7 +14,7 @@ import math
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,7 @@ from armgap.planning.dynamics import LATENT, inverse_dynamics
 from armgap.planning.motion import Motion
 from armgap.planning.outcome import ABOVE_FLOOR, CERTAIN, HELD_CERTAIN, MATTERS, Outcome, certainty
 
-__all__ = ["HypothesisPair", "PredictedMotion", "Setting"]
+__all__ = ["HypothesisPair", "PredictedMotion", "Rest", "Setting"]
 
 Array = NDArray[np.float64]
 
@@ -57,6 +57,28 @@ SETTLED = 0.02
 _MEASURED = ("encoder_offset", "encoder_eccentricity")
 
 
+class Rest(NamedTuple):
+    """Error of predictions that a model leaves beyond the noise floor: discrepancy of the model.
+
+    Attributes
+    ----------
+    discrepancy : tuple of float
+        RMS error beyond the floor, or the least that is assumed, per joint [rad or m].
+    excess : float
+        Mean square error beyond the floor's, over the floor's; mean over the joints.
+    """
+
+    discrepancy: tuple[float, ...]
+    excess: float
+
+    @classmethod
+    def of(cls, rms: Array, floor: Array) -> Rest:
+        """Return the rest for RMS errors of predictions and their floor, shape (n_joints,) each."""
+        beyond = np.maximum(rms**2 - floor**2, 0.0)
+        discrepancy = np.sqrt(np.maximum(beyond, (LEAST_DISCREPANCY * floor) ** 2))
+        return cls(tuple(discrepancy.tolist()), float(np.mean(beyond / np.maximum(floor, 1e-12) ** 2)))
+
+
 @dataclass(frozen=True)
 class Setting:
     """Models, noise and horizon with which the expected evidence of a motion is computed.
@@ -71,30 +93,34 @@ class Setting:
         Standard deviation of a measured position [rad or m].
     encoder_step : ndarray, shape (n_joints,)
         Step of the encoders, zero where unknown [rad or m].
-    discrepancy : ndarray, shape (n_joints,)
-        RMS error of predictions that the best model leaves beyond the noise floor [rad or m].
-    excess : float
-        Mean square prediction error of the best model beyond the noise floor's, over the floor's; mean over the joints.
+    rest : Rest
+        Error of predictions that the best model leaves beyond the noise floor.
+    unknown : ndarray, shape (n_parameters,)
+        Variance of each of the arm's parameters after the diagnosis over that of its prior, 0 to 1: part of the prior's evidence that the diagnosed
+        logs have not used up.
     """
 
     model: Hypothesis
     horizon: float
     sigma: Array
     encoder_step: Array
-    discrepancy: Array
-    excess: float
+    rest: Rest
+    unknown: Array
 
     @classmethod
     def of(cls, data: dict[str, Any], model: Hypothesis) -> Setting:
         """Return the setting for a diagnosis (its JSON object) and its best model."""
         gap, noise = data["gap"], data["noise"]
-        after, floor = np.array(gap["after"], dtype=np.float64), np.array(gap["floor"], dtype=np.float64)
-        beyond = np.maximum(after**2 - floor**2, 0.0)
         sigma = np.maximum(np.array(noise["position_sigma"], dtype=np.float64), 1e-12)
         step = np.array(noise.get("encoder_step") or np.zeros(len(sigma)), dtype=np.float64)
-        discrepancy = np.sqrt(np.maximum(beyond, (LEAST_DISCREPANCY * floor) ** 2))
-        excess = float(np.mean(beyond / np.maximum(floor, 1e-12) ** 2))
-        return cls(model, float(gap["horizon_s"]), sigma, step, discrepancy, excess)
+        rest = Rest.of(np.array(gap["after"], dtype=np.float64), np.array(gap["floor"], dtype=np.float64))
+        values = data["parameters"]
+        known = [
+            values["with_causes"][name]["sigma"] / values["nominal"][name]["sigma"]
+            for name in model.arm.parameter_names
+        ]
+        unknown = np.clip(np.array(known, dtype=np.float64) ** 2, 0.0, 1.0)
+        return cls(model, float(gap["horizon_s"]), sigma, step, rest, unknown)
 
     @property
     def arm(self) -> Arm:
@@ -120,11 +146,14 @@ class HypothesisPair:
         Effects of the rival, the model without the effect in question.
     free : EffectInstance, optional
         Effect of the rival whose values are fitted; None for a rival without such an effect.
+    rest : Rest, optional
+        Error of predictions that a model with the effect in question leaves on the diagnosed logs; by default that of the best model.
     """
 
     alternatives: tuple[tuple[float, tuple[EffectInstance, ...]], ...]
     rival: tuple[EffectInstance, ...]
     free: EffectInstance | None = None
+    rest: Rest | None = None
 
 
 class PredictedMotion:
@@ -164,10 +193,15 @@ class PredictedMotion:
             np.polynomial.legendre.legvander(np.linspace(-1.0, 1.0, self._samples + 1), DEGREES)
         )
         self._basis: Array = polynomials[:, 2:]
-        self._white, self._whole = self._weights()
+        self._weights: dict[Rest, tuple[Array, Array]] = {}
         self._columns: Array | None = None
 
-    def _weights(self) -> tuple[Array, Array]:
+    def _weights_of(self, rest: Rest) -> tuple[Array, Array]:
+        if rest not in self._weights:
+            self._weights[rest] = self._weights_beside(np.array(rest.discrepancy))
+        return self._weights[rest]
+
+    def _weights_beside(self, discrepancy: Array) -> tuple[Array, Array]:
         """Return inverse standard deviations of the polynomial coefficients, by white noise and in total, by window, degree and joint, flattened.
 
         An encoder's rounding error is constant until the joint has moved by a step. The discrepancy is modelled as a torque that changes from
@@ -182,7 +216,7 @@ class PredictedMotion:
         held = np.clip(setting.encoder_step / np.maximum(way, 1e-15), 1.0, setting.horizon / period)
         noise = (setting.sigma**2 - rounding + rounding * held) * share
         degree = np.arange(2, DEGREES + 1)[None, :, None]
-        bend = n * (setting.discrepancy / BEND) ** 2 * (2.0 / degree) ** 4
+        bend = n * (discrepancy / BEND) ** 2 * (2.0 / degree) ** 4
         shape = (self._count, DEGREES - 1, self._arm.n_joints)
         white = np.broadcast_to(1.0 / np.sqrt(setting.sigma**2 * share), shape)
         return white.ravel(), (1.0 / np.sqrt(noise[:, None, :] + bend)).ravel()
@@ -297,9 +331,10 @@ class PredictedMotion:
             Gauss-Newton steps in which the wrong model of the pair is fitted to the other's motion, beyond the first-order fit.
         """
         weight = np.array([w for w, _ in pair.alternatives])
+        excess = (pair.rest or self._setting.rest).excess
         residuals = 0.5 * self._arm.n_joints * self._setting.horizon / self._arm.sample_period
         half = self._every * residuals
-        needs = max(MATTERS * self._setting.excess, ABOVE_FLOOR - 1.0 - self._setting.excess) * half
+        needs = max(MATTERS * excess, ABOVE_FLOOR - 1.0 - excess) * half
         spread = math.sqrt(half) / needs
         try:
             found = np.array([self._evidence(effects, pair, residuals, steps) for _, effects in pair.alternatives])
@@ -326,7 +361,8 @@ class PredictedMotion:
     def left_of(self, delta: Array, column: Array | None = None) -> tuple[float, float]:
         """Return the squared rest of a difference after a fit of the values common to all models, and the coefficient of `column`, if fitted too."""
         free = np.empty((len(delta), 0)) if column is None else column[:, None]
-        found = Columns(self.sensitivities(), free, (), len(self._arm.sigma)).fitted(delta, self._whole)
+        _, whole = self._weights_of(self._setting.rest)
+        found = Columns(self.sensitivities(), free, (), len(self._arm.sigma)).fitted(delta, whole)
         return found.square, 0.0 if column is None else float(found.values[-1])
 
     def _difference(self, effects: tuple[EffectInstance, ...], pair: HypothesisPair) -> tuple[Array, bool]:
@@ -338,6 +374,7 @@ class PredictedMotion:
         self, effects: tuple[EffectInstance, ...], pair: HypothesisPair, residuals: float, steps: int
     ) -> tuple[float, float, float, float, float]:
         theta = self._setting.model.theta
+        white, whole = self._weights_of(pair.rest or self._setting.rest)
         lead = latent((*effects, *pair.rival))
         truth = self.predicted(theta, effects, lead)
         delta = truth - self.predicted(theta, pair.rival, lead)
@@ -346,26 +383,27 @@ class PredictedMotion:
         # A diagnosis fits the rival to the first windows and judges it on the others.
         first = self._windows < TRAINED * self._every
         trained = np.repeat(first, len(delta) // self._count)
-        best = columns.fitted(delta, self._whole * trained)
-        plain = 0.5 * float(np.sum((delta * self._whole) ** 2))
+        best = columns.fitted(delta, whole * trained)
+        plain = 0.5 * float(np.sum((delta * whole) ** 2))
         for _ in range(steps):
             # Gauss-Newton: the rival predicts with the fitted values, and the remaining difference is fitted again.
-            moved, rival = self._moved(pair, columns, best.values)
+            changed, rival = self._moved(pair, columns, best.values)
             try:
-                missed = truth - self.predicted(moved, rival, lead)
+                missed = truth - self.predicted(changed, rival, lead)
             except ValueError:
                 break
             linear = columns.product(best.values, simulated=True)
-            again = columns.fitted(missed + linear, self._whole * trained)
+            again = columns.fitted(missed + linear, whole * trained)
             gain = best.square - again.square
             if gain > 0:
                 delta, best = missed + linear, again
             if gain < SETTLED * best.square:
                 break
         left = 0.5 * np.sum(best.left.reshape(self._count, -1) ** 2, axis=1)
-        prior = max(0.5 * best.square - float(np.sum(left)), 0.0)
-        by_noise = columns.fitted(delta, self._white * trained)
-        beyond = (delta - columns.product(by_noise.values, simulated=False)) * self._white
+        moved = best.values[: len(theta)]
+        prior = 0.5 * float(self._setting.unknown @ moved**2)
+        by_noise = columns.fitted(delta, white * trained)
+        beyond = (delta - columns.product(by_noise.values, simulated=False)) * white
         windows = 0.5 * np.sum(beyond.reshape(self._count, -1) ** 2, axis=1)
         share = self._share
         above = share * min(float(np.sum(windows[first])) / TRAINED, float(np.sum(windows[~first])) / (1.0 - TRAINED))
@@ -395,7 +433,7 @@ class PredictedMotion:
         """Return names of the rival's fitted values, and derivatives of its predictions by them."""
         theta, free = self._setting.model.theta, pair.free
         if free is None:
-            return (), np.empty((len(self._white), 0))
+            return (), np.empty((self._count * (DEGREES - 1) * self._arm.n_joints, 0))
         reference = self.predicted(theta, pair.rival, lead)
         names, columns = [], []
         for name, value in free.parameters.items():

@@ -16,8 +16,8 @@ __all__ = ["PlanLimits", "limits_of"]
 
 Array = NDArray[np.float64]
 
-#: Part of a limit that a reference motion may use, as the arm overshoots its reference, by a tenth if the drive is slow.
-MARGIN = 0.92
+#: Part of a limit that a reference motion may use, as the arm overshoots its reference, by an eighth if the drive is slow or late.
+MARGIN = 0.88
 #: Part of the torque limit that the feed-forward torque may use under the diagnosis' best model, re-estimated and with its causes; the rest is left
 #: to the controller.
 TORQUE_MARGIN = 0.8

@@ -69,7 +69,7 @@ def _parameters(data: Data) -> list[str]:
 
 
 def _effect(data: Data) -> list[str]:
-    steps = [_alike(c) for c in data["causes"] if c.get("equivalents")]
+    steps = [_alike(c, data) for c in data["causes"] if c.get("equivalents")]
     steps.append(f"Export the corrected model: {_export(data)}.")
     steps.append(_AGAIN)
     if leaves_part(data):
@@ -80,9 +80,13 @@ def _effect(data: Data) -> list[str]:
     return steps
 
 
-def _alike(cause: Data) -> str:
+def _alike(cause: Data, data: Data) -> str:
     others = " or ".join(dict.fromkeys(named(e) for e in cause["equivalents"]))
-    return f"These logs do not tell {named(cause)}, from {others}: look at the arm before you repair it; the section on look-alikes says why."
+    text = f"These logs do not tell {named(cause)}, from {others}: look at the arm before you repair it"
+    if any(e.get("motion_separates", True) for e in cause["equivalents"]):
+        text += ", or record another motion" + ("" if _is_serial(data) else ", which armgap plan finds")
+        return f"{text}; the section on look-alikes says which of them it may separate."
+    return f"{text}; no motion separates them, and the section on look-alikes says what does."
 
 
 def _unexplained(data: Data) -> list[str]:

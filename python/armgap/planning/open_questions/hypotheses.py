@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from armgap import _native
 from armgap.evidence.hypothesis import EffectInstance, at_motor
-from armgap.planning.criterion import HypothesisPair, PredictedMotion
+from armgap.planning.criterion import HypothesisPair, PredictedMotion, Rest
 from armgap.planning.open_questions.questions import NONE, Question
 from armgap.planning.open_questions.sizes import PLANNED, Scales, Shape, levels, shapes
 
@@ -100,9 +100,18 @@ class HypothesisBuilder:
         size = max(self._usual.floors(rough, i, self._floor) for i in range(len(every)))
         free = None if question.against == NONE else self._rival(question, rough)
         rival = without if free is None else (*without, free)
-        pair = HypothesisPair(tuple(every), rival, free)
-        quick = HypothesisPair(_few(every), rival, free)
+        rest = self._rest_with(question)
+        pair = HypothesisPair(tuple(every), rival, free, rest)
+        quick = HypothesisPair(_few(every), rival, free, rest)
         return TestedQuestion(question, pair, quick, size, self._range(question, [e for _, e in groups]))
+
+    def _rest_with(self, question: Question) -> Rest | None:
+        """Return what the diagnosis' best model leaves with the effect in question added, where that is less: the gap may be its doing."""
+        tried = [e["rms"] for e in self._data.get("ranking") or [] if (e["effect"], e["joint"]) == question.place]
+        if not tried:
+            return None
+        after = np.array(self._data["gap"]["after"], dtype=np.float64)
+        return Rest.of(np.minimum(after, np.array(tried[0], dtype=np.float64)), self._floor)
 
     def look_alikes(self, tested: TestedQuestion) -> list[Question]:
         """Return questions of an effect against effects that may imitate it, the most similar first.

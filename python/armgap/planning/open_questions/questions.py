@@ -92,9 +92,12 @@ def open_questions(data: Data) -> tuple[list[Question], list[str]]:
     """
     found: list[Question] = []
     remarks: list[str] = []
+    same: set[tuple[tuple[str, int | None], tuple[str, int | None]]] = set()
     for cause in data["causes"]:
         for other in cause["equivalents"]:
-            if cause["effect"] in PLANNED and other["effect"] in PLANNED:
+            if not (separates := other.get("motion_separates", True)):
+                same.add(((cause["effect"], cause["joint"]), (other["effect"], other["joint"])))
+            if separates and cause["effect"] in PLANNED and other["effect"] in PLANNED:
                 question = Question(cause["effect"], cause["joint"], other["effect"], other["joint"], "equivalents")
                 found.append(replace(question, estimate=_estimate(cause), why=other.get("why") or ""))
             else:
@@ -110,7 +113,9 @@ def open_questions(data: Data) -> tuple[list[Question], list[str]]:
         if entry["status"] not in ("undecided", "not excited") or entry["effect"] not in PLANNED:
             continue
         place, why = (entry["effect"], entry["joint"]), entry.get("why") or ""
-        instead = [c for c in data["causes"] if _would_stand_for(entry, c)]
+        instead = [
+            c for c in data["causes"] if _would_stand_for(entry, c) and ((c["effect"], c["joint"]), place) not in same
+        ]
         for cause in instead:
             question = Question(cause["effect"], cause["joint"], *place, "undecided", _estimate(cause))
             found.append(replace(question, why=why))

@@ -94,10 +94,10 @@ pub fn assemble<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         causes: headline
             .causes
             .iter()
-            .map(|c| cause(c, N, rotary))
+            .map(|c| cause(c, context, headline, description))
             .chain(disturbances.iter().map(|e| push(context, e, rotary)))
             .collect(),
-        candidates: unnamed(context, headline, rotary),
+        candidates: unnamed(context, headline, description),
         ruled_out: absent
             .into_iter()
             .filter(|r| {
@@ -180,12 +180,14 @@ fn joint_shares<A: Arm<f64, N, P>, const N: usize, const P: usize>(
 }
 
 /// Causes and external disturbances that were found and are not named, with reasons.
-fn unnamed<A, const N: usize, const P: usize>(
+fn unnamed<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     context: &DiagnosisContext<A, N, P>,
     headline: &Headline<N, P>,
-    rotary: bool,
+    description: &ArmDescription,
 ) -> Vec<report::Candidate> {
-    let effects = headline.candidates.iter().map(|u| (cause(&u.found, N, rotary), &u.why));
+    let rotary = description.kind.rotary();
+    let effects =
+        headline.candidates.iter().map(|u| (cause(&u.found, context, headline, description), &u.why));
     let pushes = headline.disturbance_candidates.iter().map(|u| (push(context, &u.found, rotary), &u.why));
     effects.chain(pushes).map(|(cause, why)| report::Candidate { cause, why: why.clone() }).collect()
 }
@@ -201,9 +203,20 @@ fn estimates<const P: usize>(fit: &Fit<P>, description: &ArmDescription) -> Vec<
     (0..P).map(one).collect()
 }
 
-fn cause(cause: &crate::search::belief::Cause, joints: usize, rotary: bool) -> Cause {
+fn cause<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    cause: &crate::search::belief::Cause,
+    context: &DiagnosisContext<A, N, P>,
+    headline: &Headline<N, P>,
+    description: &ArmDescription,
+) -> Cause {
     let spec = cause.effect.law.spec();
-    let equivalents = crate::search::rivals::equivalent::all(&cause.effect, &cause.look_alikes, joints);
+    let rotary = description.kind.rotary();
+    let compared = context.same_torque(&headline.model.hypothesis, rotary);
+    let moved = |other: &EffectInstance| {
+        let indices = compared.moved(&cause.effect, other)?;
+        Some(indices.into_iter().map(|i| A::PARAMETERS[i].name).collect())
+    };
+    let equivalents = crate::search::rivals::equivalent::all(&cause.effect, &cause.look_alikes, N, moved);
     Cause {
         effect: spec.name,
         title: spec.title,
@@ -219,6 +232,7 @@ fn cause(cause: &crate::search::belief::Cause, joints: usize, rotary: bool) -> C
                 joint: e.joint,
                 on: SeveralJoints::default(),
                 why: e.why,
+                motion_separates: e.motion_separates,
             })
             .collect(),
         evidence: Some(cause.evidence),
@@ -310,6 +324,7 @@ fn nodes<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         joint: effect.joint_number(),
         on: SeveralJoints::default(),
         why: String::new(),
+        motion_separates: true,
     };
     let summary = |(i, node): (usize, &crate::search::attribute::SearchNode<N, P>)| StageSummary {
         added: attribution.added(i).map(summary_of),

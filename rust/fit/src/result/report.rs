@@ -299,6 +299,8 @@ pub struct EquivalentSummary {
     pub on: SeveralJoints,
     /// Reason why the effect and the cause cannot be told apart.
     pub why: String,
+    /// Whether another motion may tell them apart; if not, `why` names the measurement that does.
+    pub motion_separates: bool,
 }
 
 /// Status of an effect that was looked for and is not a cause, the surest first.

@@ -11,12 +11,16 @@ pub struct Equivalent {
     pub joint: Option<usize>,
     /// Reason why the effect and the given effect cannot be distinguished.
     pub why: String,
+    /// Whether another motion may distinguish them.
+    pub motion_separates: bool,
 }
 
 /// Effects that give the same motion as `effect` on an arm with `joints` joints, under any torques.
 pub fn known(effect: &EffectInstance, joints: usize) -> Vec<Equivalent> {
     let joint = effect.joint_number();
-    let one = |effect, joint, why: &str| vec![Equivalent { effect, joint, why: why.to_owned() }];
+    let one = |effect, joint, why: &str| {
+        vec![Equivalent { effect, joint, why: why.to_owned(), motion_separates: false }]
+    };
     match effect.law.spec().name {
         "coulomb_asymmetry" => one(
             "torque_offset",
@@ -48,6 +52,7 @@ pub fn known(effect: &EffectInstance, joints: usize) -> Vec<Equivalent> {
                 joint: Some(j),
                 why: "the inverse gain there with all parameters scaled; a known added mass separates them"
                     .to_owned(),
+                motion_separates: false,
             })
             .collect(),
         _ => Vec::new(),
@@ -63,24 +68,35 @@ pub fn are(a: &EffectInstance, b: &EffectInstance, joints: usize) -> bool {
     a.same_place(b) || among(a, b) || among(b, a)
 }
 
-/// Whether the law named `whole` becomes the law named `part` where its further values are zero.
-fn contains(whole: &str, part: &str) -> bool {
-    (whole, part) == ("hardening_spring", "joint_spring")
-}
-
-/// Effects that cannot be distinguished from `effect`: those known to give the same motion, then the look-alikes found in the logs, none twice.
-pub fn all(effect: &EffectInstance, look_alikes: &[EffectInstance], joints: usize) -> Vec<Equivalent> {
+/// Effects that cannot be distinguished from `effect`: those known to give the same motion, then the look-alikes found in the logs, none twice. `moved`
+/// returns the parameters of the arm at whose other values a look-alike needs the torques of `effect` in every state, `None` if it does not.
+pub fn all(
+    effect: &EffectInstance,
+    look_alikes: &[EffectInstance],
+    joints: usize,
+    moved: impl Fn(&EffectInstance) -> Option<Vec<&'static str>>,
+) -> Vec<Equivalent> {
     let mut list = known(effect, joints);
     for other in look_alikes {
         let (name, joint) = (other.law.spec().name, other.joint_number());
-        if !list.iter().any(|e| e.effect == name && e.joint == joint) {
-            let why = if contains(name, effect.law.spec().name) {
-                "contains it: the same law where its further values are zero"
-            } else {
-                "explains these logs about as well; other motions may separate them"
-            };
-            list.push(Equivalent { effect: name, joint, why: why.to_owned() });
+        if list.iter().any(|e| e.effect == name && e.joint == joint) {
+            continue;
         }
+        let moved = moved(other);
+        let motion_separates = moved.is_none();
+        let why = match moved.as_deref() {
+            None => "explains these logs about as well; other motions may separate them".to_owned(),
+            Some([]) => {
+                "gives the same torque in every state, at other values; no motion separates them".to_owned()
+            }
+            Some(parameters) => {
+                let names = parameters.join(", ");
+                format!(
+                    "gives the same torque in every state with {names} at other values; no motion separates them, a measured {names} does"
+                )
+            }
+        };
+        list.push(Equivalent { effect: name, joint, why, motion_separates });
     }
     list
 }
@@ -105,9 +121,19 @@ mod tests {
             assert!(!are(&placed(a, i), &placed(b, j), 2), "{a} {b}");
         }
         assert!(are(&placed("torque_gain", 0), &placed("torque_gain", 1), 2));
-        let list =
-            all(&placed("joint_spring", 0), &[placed("hardening_spring", 0), placed("torque_ripple", 0)], 2);
-        assert!(list[0].why.starts_with("contains it") && list[1].why.contains("other motions"), "{list:?}");
+        let found = [placed("hardening_spring", 0), placed("torque_ripple", 0), placed("payload", 0)];
+        let moved = |other: &EffectInstance| match other.law.spec().name {
+            "hardening_spring" => Some(Vec::new()),
+            "payload" => Some(vec!["theta3"]),
+            _ => None,
+        };
+        let list = all(&placed("joint_spring", 0), &found, 2, moved);
+        assert_eq!(list.iter().map(|e| e.motion_separates).collect::<Vec<_>>(), [false, true, false]);
+        assert!(list[0].why.ends_with("no motion separates them"), "{list:?}");
+        assert!(
+            list[1].why.contains("other motions may") && list[2].why.ends_with("a measured theta3 does"),
+            "{list:?}"
+        );
         assert!(are(&placed("payload", 0), &placed("payload", 0), 2));
     }
 }

@@ -94,6 +94,7 @@ pub(in crate::serial) fn cause(
         joint: t.joint(),
         on: several(t),
         why: LOOK_ALIKE.to_owned(),
+        motion_separates: true,
     };
     let mut cause = Cause {
         effect: term.name(),

@@ -30,6 +30,7 @@ pub(in crate::serial) fn behind_controller(
         joint: cause.joint,
         on: SeveralJoints::default(),
         why,
+        motion_separates: false,
     };
     match cause.effect {
         "torque_offset" if of.gains[0] > 0.0 => {
