@@ -16,7 +16,7 @@ from armgap.arm import MotionLimits
 from armgap.errors import ArmFileError, ArmgapError, OptionError
 from armgap.evidence.hypothesis import EffectInstance
 from armgap.planning import criterion, search
-from armgap.planning.criterion import HypothesisPair, PredictedMotion, Setting
+from armgap.planning.criterion import HypothesisPair, PredictedMotion, Rest, Setting
 from armgap.planning.dynamics import inverse_dynamics
 from armgap.planning.limits import MARGIN, TORQUE_MARGIN, limits_of
 from armgap.planning.motion import Motion, build, count, named
@@ -217,6 +217,34 @@ def test_a_torque_gain_needs_a_trusted_mass(limited, diagnosis, trust, low, high
     gains = tuple(EffectInstance("torque_gain", j, {"gain": 1.02}) for j in (1, 2))
     outcome = predicted_motion(diagnosis, arm, usual(arm)).outcome(HypothesisPair(((1.0, gains),), ()))
     assert low <= outcome.settled(7.0) <= high
+
+
+def test_trust_that_the_diagnosed_logs_have_used_up_promises_nothing(limited, diagnosis):
+    arm = replace(limited, sigma=1e-4 * np.abs(limited.theta))
+    gains = tuple(EffectInstance("torque_gain", j, {"gain": 1.02}) for j in (1, 2))
+    model, _ = known_model(diagnosis.to_dict(), arm)
+    setting = Setting.of(diagnosis.to_dict(), model)
+    assert np.all(setting.unknown <= 1.0)
+    assert np.all(setting.unknown >= 0.0)
+    pair = HypothesisPair(((1.0, gains),), ())
+    new, used = (
+        PredictedMotion(replace(setting, unknown=share * np.ones(len(arm.theta))), usual(arm)).outcome(pair)
+        for share in (1.0, 0.0)
+    )
+    assert new.prior[0] > 100.0
+    assert used.prior[0] == 0.0
+    assert new.expected == pytest.approx(used.expected + new.prior[0])
+
+
+def test_a_gap_that_the_effect_explains_is_no_discrepancy(limited, diagnosis):
+    motion = predicted_motion(diagnosis, limited, usual(limited))
+    drag = EffectInstance("quadratic_drag", 1, {"c": 0.2})
+    floor = np.array(diagnosis.gap.floor)
+    left, explained = (
+        motion.outcome(HypothesisPair(((1.0, (drag,)),), (), rest=Rest.of(gap * floor, floor))) for gap in (30.0, 1.0)
+    )
+    assert explained.expected > 10.0 * left.expected
+    assert explained.above[0] > left.above[0]
 
 
 # Plans
