@@ -170,6 +170,7 @@ def test_torques_that_come_late_in_the_file(two_links: list[Log], arm: Arm, samp
     assert [c.severity for c in checked(late, arm, repair=False)] == ["warning"]
 
 
+@pytest.mark.slow
 def test_torques_that_come_early_are_seen_by_predictions(two_links: list[Log], arm: Arm) -> None:
     assert time_shift.early(two_links[:1], two_links[1:], arm, 0.25) is None
     early = [replace(log, tau=np.vstack([log.tau[3:], np.repeat(log.tau[-1:], 3, axis=0)])) for log in two_links]

@@ -49,6 +49,7 @@ def switched(t: np.ndarray, seed: int) -> np.ndarray:
     return tau
 
 
+@pytest.mark.slow
 def test_a_drive_that_slews_far_behind_its_command_has_no_other_columns(arm: Arm) -> None:
     t = np.arange(2400) * arm.sample_period
     logs = []

@@ -82,6 +82,7 @@ def test_weight_tells_reversed_positions_from_reversed_torques(
     assert (check.check, check.severity, check.remedies) == (name, "error", remedies)
 
 
+@pytest.mark.slow
 def test_an_arm_file_that_is_too_sure_of_wrong_values_is_given_up(arm: Arm) -> None:
     wrong = np.where(np.arange(len(arm.theta)) < arm.n_inertial, 3.0, 1.0)
     sure = replace(arm, theta=wrong * arm.theta, sigma=0.05 * wrong * arm.theta)

@@ -148,6 +148,7 @@ def test_columns_and_units_on_the_command_line(arm_file, log_file, tmp_path, run
         assert results[1][name]["value"] == pytest.approx(entry["value"], rel=1e-6), name
 
 
+@pytest.mark.slow
 def test_no_color_is_honoured(arm_file, log_file):
     for force in ({}, {"FORCE_COLOR": "1"}):
         done = armgap("identify", log_file, "--arm", arm_file, env={**os.environ, "NO_COLOR": "1", **force})

@@ -113,6 +113,7 @@ def test_the_first_documents_show_the_sketch_and_name_the_sign_of_the_torque(doc
     assert "ositive torque turns" in " ".join(text.split())
 
 
+@pytest.mark.slow
 def test_a_report_shows_the_kind_in_use_near_its_top() -> None:
     page = render_html(cases.named())
     assert panel("pendulum") in page

@@ -31,6 +31,7 @@ def clean(pendulum: Arm) -> Diagnosis:
     return diagnose(swing(pendulum, 1), pendulum)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("which", ["found", "clean"])
 def test_json_keeps_the_schema(which, request):
     result: Diagnosis = request.getfixturevalue(which)
@@ -68,6 +69,7 @@ def test_a_hidden_effect_is_named_placed_and_sized(found):
     assert found.gap.after[0] < 0.2 * found.gap.before[0]
 
 
+@pytest.mark.slow
 def test_effects_that_no_log_tells_apart_share_one_probability(tmp_path):
     """A constant force, a tilted base and a shifted zero of a horizontal axis restore the arm file's values alike: one of them is there."""
     file = tmp_path / "axis.toml"
@@ -105,6 +107,7 @@ def loaded_one_way(arm: Arm, seed: int, backlash: Effect) -> Log:
     return dataclasses.replace(loaded, t=loaded.t[settled], q=loaded.q[settled], tau=loaded.tau[settled], moment=None)
 
 
+@pytest.mark.slow
 def test_backlash_that_only_the_training_log_passes_is_no_push(pendulum: Arm) -> None:
     backlash = Effect("backlash", 1, {"gap": 0.01, "rotor_share": 0.1, "riding": 0.0})
     training = swing(pendulum, 3, backlash, noise=2e-5)
@@ -113,6 +116,7 @@ def test_backlash_that_only_the_training_log_passes_is_no_push(pendulum: Arm) ->
     assert any("different gaps" in note for note in result.extra["notes"])
 
 
+@pytest.mark.slow
 def test_a_gap_of_the_training_logs_alone_is_no_none(pendulum: Arm) -> None:
     """The arm of the holdout has no backlash, so learning from stretches of both by turns explains nothing."""
     backlash = Effect("backlash", 1, {"gap": 0.01, "rotor_share": 0.1, "riding": 0.0})

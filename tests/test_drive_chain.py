@@ -146,12 +146,14 @@ def test_the_drive_leads_where_the_drive_is_late() -> None:
     assert "within the period of a sample" in first["detail"]
 
 
+@pytest.mark.slow
 def test_mechanics_lead_where_the_torque_acts_behind_the_drives() -> None:
     entries = chain(*logs(drive=False, extra=spring))
     assert (entries[0]["stage"], entries[0]["joint"]) == ("mechanics", 2)
     assert all(e["share"] < LEAST_SHARE for e in entries if e["stage"] == "drive")
 
 
+@pytest.mark.slow
 def test_shares_are_parts_of_one_whole() -> None:
     for kind in ({"drive": True}, {"drive": False, "extra": spring}, {"drive": False}):
         entries = chain(*logs(**kind))  # type: ignore[arg-type]

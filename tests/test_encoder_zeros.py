@@ -37,6 +37,7 @@ def zeros(data: dict[str, Any], use: str) -> tuple[np.ndarray, np.ndarray]:
     return np.array([z["value"][0] for z in found]), np.array([z["sigma"][0] for z in found])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("use", "wanted"), [("training", ZEROS_RAD), ("holdout", np.array([HOLDOUT_RAD]))])
 def test_zeros_are_found(scattered: Diagnosis, use: str, wanted: np.ndarray) -> None:
     found, sigma = zeros(scattered.to_dict(), use)
@@ -59,6 +60,7 @@ def test_the_gap_beside_known_zeros_is_said(scattered: Diagnosis) -> None:
     assert columns[-1] == "encoder zeros [mrad]"
 
 
+@pytest.mark.slow
 def test_what_all_recordings_share_is_a_cause(pendulum: Arm) -> None:
     """On a pendulum, of the encoder or of gravity: both turn its weight."""
     first = asked(pendulum, 0.06).causes[0]
@@ -74,6 +76,7 @@ def test_one_recording_has_no_zeros_of_its_own(pendulum: Arm) -> None:
     assert "second_halves" not in data["gap"]
 
 
+@pytest.mark.slow
 def test_parts_of_one_recording_share_its_zero(pendulum: Arm) -> None:
     """Without a holdout the last part of every training log is held out: its zero is known."""
     logs = [shifted(swing(pendulum, seed), zero) for seed, zero in enumerate(ZEROS_RAD, start=1)]

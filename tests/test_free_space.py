@@ -83,6 +83,7 @@ def diagnosed(tmp_path_factory):
     return arm, armgap.diagnose([slow_log(arm)], arm)
 
 
+@pytest.mark.slow
 def test_a_plan_touches_nothing(diagnosed, monkeypatch):
     monkeypatch.setattr(search, "POPULATION", 6)
     monkeypatch.setattr(search, "GENERATIONS", 1)
@@ -95,6 +96,7 @@ def test_a_plan_touches_nothing(diagnosed, monkeypatch):
     assert not any("link_radius" in note for note in made.notes)
 
 
+@pytest.mark.slow
 def test_without_shapes_it_is_said(diagnosed, monkeypatch):
     monkeypatch.setattr(search, "POPULATION", 6)
     monkeypatch.setattr(search, "GENERATIONS", 1)

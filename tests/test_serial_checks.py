@@ -72,6 +72,7 @@ def test_every_stretch_of_a_log_is_judged(quiet: list[Log], arm: Arm) -> None:
     assert (len(checks), len(corrections.skip)) == (2, 2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("joint", [1, 2])
 def test_a_torque_that_no_log_holds_is_no_cause(joint: int, quiet: list[Log], arm: Arm) -> None:
     given = [without_torque(log, joint) for log in quiet]
@@ -120,6 +121,7 @@ def test_an_arm_that_swings_freely_is_no_defect(arm: Arm) -> None:
     assert find(logs(arm, driven=()), arm)[1] == []
 
 
+@pytest.mark.slow
 def test_units_are_found_where_most_torques_are_too_small(quiet: list[Log], arm: Arm) -> None:
     scale = np.array([1 / 160, 1 / 7, -1 / 6])
     corrections, checks = contradictions([replace(log, tau=log.tau * scale) for log in quiet], arm)

@@ -26,7 +26,7 @@ DELAYS = [0.010, 0.012, 0.011]
 LATE = {
     "effect": "actuator_delay", "title": "actuator delay", "joint": None, "joints": [1, 2, 3], "probability": 0.9, "closed": 0.8,
     "parameters": {"delay": {"value": DELAYS, "sigma": [0.001, 0.001, 0.002], "unit": "s"}},
-    "equivalents": [{"effect": "actuator_lag", "joint": None, "joints": [1, 2, 3], "why": "as well"}],
+    "equivalents": [{"effect": "actuator_lag", "joint": None, "joints": [1, 2, 3], "why": "as well", "motion_separates": True}],
 }  # fmt: skip
 COUPLED = {
     "effect": "coupled_transmission", "title": "transmission that couples two joints", "joint": None, "joints": [1, 2], "row": [1, -1],
@@ -36,7 +36,7 @@ COUPLED = {
         "viscous": {"value": 0.4, "sigma": 0.1, "unit": "N m s/rad"},
         "coulomb": {"value": 0.2, "sigma": 0.1, "unit": "N m"},
     },
-    "equivalents": [{"effect": "joint_spring", "joint": None, "joints": [1, 2], "row": [1, -1], "why": "as well"}],
+    "equivalents": [{"effect": "joint_spring", "joint": None, "joints": [1, 2], "row": [1, -1], "why": "as well", "motion_separates": True}],
 }  # fmt: skip
 
 
@@ -104,6 +104,7 @@ def test_a_comparison_goes_joint_by_joint(arm: Arm, found: Diagnosis) -> None:
     assert next(c for c in changes if c.effect == "coupled_transmission").joints == (1, 2)
 
 
+@pytest.mark.slow
 def test_an_export_has_the_delay_of_every_joint(arm: Arm, found: Diagnosis) -> None:
     model = correct(found, arm)
     assert [joint.delay for joint in model.joints] == DELAYS
