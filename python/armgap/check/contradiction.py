@@ -152,8 +152,12 @@ class Refit:
     @property
     def relative(self) -> float:
         """RMS error as a part of the RMS displacement within a window, the geometric mean over the joints."""
+        return self.relative_on(np.ones(len(self.error), dtype=bool))
+
+    def relative_on(self, joints: NDArray[np.bool_]) -> float:
+        """Return the RMS error as a part of the RMS displacement within a window, the geometric mean over some of the joints, of a mask."""
         moved = np.maximum(self.motion, np.finfo(float).tiny)
-        return float(np.exp(np.mean(np.log(np.maximum(self.error / moved, _NEGLIGIBLE)))))
+        return float(np.exp(np.mean(np.log(np.maximum(self.error / moved, _NEGLIGIBLE))[joints])))
 
 
 def _start(logs: Sequence[Log], arm: Arm) -> Array:

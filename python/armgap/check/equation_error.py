@@ -20,7 +20,7 @@ from armgap import _native
 from armgap.arm.arm import Arm
 from armgap.log.log import Log
 
-__all__ = ["CUTOFF", "FEWEST_ROWS", "EquationError", "Fit", "Rows", "bounds"]
+__all__ = ["CUTOFF", "FEWEST_ROWS", "EquationError", "Fit", "Rows", "bounds", "position_noise"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -48,6 +48,14 @@ _BESIDE_S = 8.0
 _EXPLAINED_RESIDUAL_SHARE = 0.02
 # Share of a joint's torque below which a residual counts as zero.
 _ZERO_RESIDUAL_SHARE = 1e-5
+
+
+def position_noise(log: Log) -> Array:
+    """Return the standard deviation of white noise on each joint's positions [rad or m], from their third differences.
+
+    These differences hold little of the motion, and twenty times the variance of white noise.
+    """
+    return np.asarray(np.sqrt(np.mean(np.diff(log.q, 3, axis=0) ** 2, axis=0) / math.comb(6, 3)), dtype=np.float64)
 
 
 @dataclass(frozen=True)
@@ -260,14 +268,13 @@ class EquationError:
     def noise_square(self, logs: Sequence[Log]) -> Array:
         """Return per joint the mean square of the torque that noise of the positions leaves unexplained, by the arm file's parameters.
 
-        The noise is estimated from third differences of the positions in `logs`, from which the rows were made: these differences hold little of the
-        motion, and twenty times the variance of white noise. The torque is the change of the rows when as much noise is added to the positions.
+        The noise is that of the `logs` from which the rows were made (`position_noise`). The torque is the change of the rows when as much noise is
+        added to the positions.
         """
         rng = np.random.default_rng(0)
         left = np.zeros(len(self.scale))
         for log, rows in zip(logs, self.rows, strict=True):
-            noise = np.sqrt(np.mean(np.diff(log.q, 3, axis=0) ** 2, axis=0) / math.comb(6, 3))
-            noisy = Rows.of(replace(log, q=log.q + noise * rng.standard_normal(log.q.shape)), self.arm)
+            noisy = Rows.of(replace(log, q=log.q + position_noise(log) * rng.standard_normal(log.q.shape)), self.arm)
             left += np.sum(((noisy.psi - rows.psi) @ self.arm.theta) ** 2, axis=0)
         return left / max(self.count, 1)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -14,7 +15,7 @@ from armgap.check import dead_stretch, drive_limit, time_shift, torque_is_positi
 from armgap.check.check import Check
 from armgap.check.contradiction import AS_GOOD, BETTER, EXPLAINS, Found, Refit, Suspect, confirm, screen
 from armgap.check.elastic import beside_elasticity
-from armgap.check.equation_error import FEWEST_ROWS, EquationError, Fit, Rows, bounds
+from armgap.check.equation_error import FEWEST_ROWS, EquationError, Fit, Rows, bounds, position_noise
 from armgap.log.log import Log
 from armgap.progress import report_progress
 
@@ -33,6 +34,8 @@ _CLOSE_COST_DIFFERENCE = 1.0
 # where an effect is hidden.
 _UNRELATED = (0.5, 0.25)
 _UNPREDICTED = (0.3, 0.4)
+# Displacement within a window, in standard deviations of a measured position, from which a joint counts as moving where predictions are judged.
+_MOVED_NOISES = 10.0
 # Shifts of the torques [samples] that are tried first: torques and positions that predict well with one of them belong to the same motion.
 _SHIFTS = (-8, -5, -2, 2, 5, 8)
 
@@ -156,7 +159,8 @@ def _strangers(share: Array, now: Examined, horizon: float, pair: int) -> list[C
 
     The check is returned where parameters with the arm file's signs leave a part of a torque unexplained (`share` per joint), even together with
     springs and contacts or, while the joint moves, with a drive that saturates far below its command, and do not predict the motion even with
-    shifted torques. The part of a torque that noise of the positions leaves unexplained is not counted.
+    shifted torques. The part of a torque that noise of the positions leaves unexplained is not counted. A joint that is at rest wherever predictions
+    are judged is held by friction, under any torque up to its break-away torque: it contradicts nothing.
     """
     worst = int(np.argmax(share))
     logs = [*now.training, *now.holdout]
@@ -169,8 +173,12 @@ def _strangers(share: Array, now: Examined, horizon: float, pair: int) -> list[C
     if (fit.share - noise / np.maximum(limited.square, np.finfo(float).tiny)).max() < drive_limit.LIMITED:
         return []
     period = float(np.median(np.diff(logs[0].t)))
-    readings = [Corrections(), *(Corrections(shift={"tau": k * period}) for k in _SHIFTS)]
-    if any(_predicted(reading, now, horizon).relative < _UNPREDICTED[pair] for reading in readings):
+    stands = _predicted(Corrections(), now, horizon)
+    judged = stands.motion > _MOVED_NOISES * _resolution(logs, now.arm)
+    if not judged[worst]:
+        return []
+    shifted = (_predicted(Corrections(shift={"tau": k * period}), now, horizon) for k in _SHIFTS)
+    if any(read.relative_on(judged) < _UNPREDICTED[pair] for read in (stands, *shifted)):
         return []
     columns = ",".join(f"{kind}{j}=NAME" for kind in ("q", "tau") for j in range(1, now.arm.n_joints + 1))
     message = (
@@ -179,6 +187,13 @@ def _strangers(share: Array, now: Examined, horizon: float, pair: int) -> list[C
         "was tried; are these columns of this arm's joints?"
     )
     return [Check("joint_order", "error", message, (f"--columns {columns}",), worst + 1)]
+
+
+def _resolution(logs: Sequence[Log], arm: Arm) -> Array:
+    """Return the standard deviation of each joint's measured positions [rad or m]: of their noise, or of the rounding to encoder counts if larger."""
+    noise = np.max([position_noise(log) for log in logs], axis=0)
+    step = np.zeros_like(noise) if arm.encoder_step is None else arm.encoder_step
+    return np.asarray(np.maximum(noise, step / math.sqrt(12.0)), dtype=np.float64)
 
 
 def _beside_elasticity(base: EquationError, logs: Sequence[Log], arm: Arm) -> Fit:
