@@ -81,7 +81,7 @@ def one(case: Case, seed: int, duration: float, ask: bool) -> dict[str, Any] | N
             with suppress(ValueError, KeyError):  # effects that the library has no values for, or cannot simulate
                 result[f"{key} expected"] = expected(case, before, arm_file, reference, open_plan.threshold)
             trace = play(case, arm, reference)
-            result[f"{key} obtained"] = obtained(case.effect, arm_file, arm, trace, before.gap.horizon_s)
+            result[f"{key} obtained"] = obtained(case, arm_file, arm, trace, before.gap.horizon_s)
             after = armgap.diagnose([first, log_of(trace, key)], arm_file)
             result[key] = named(after, case)
             result[f"{key} used"] = used(trace, case.arm, arm.torque_limit)

@@ -150,7 +150,7 @@ def expected(
     hidden = EffectInstance(case.effect, case.joint, library_values(case))
     setting = Setting.of(before.to_dict(), model)
     # The true arm leaves noise alone.
-    noise = Rest.of(np.zeros(arm.n_joints), np.array(before.gap.floor))
+    noise = Rest.of(np.zeros(arm.n_joints), setting.sigma)
     played = PredictedMotion(setting, Sampled(t, reference))  # type: ignore[arg-type]
     outcome = played.outcome(HypothesisPair(((1.0, (*without, hidden)),), without, rest=noise))
     return outcome.expected, outcome.settled(threshold)

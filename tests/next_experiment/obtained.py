@@ -1,7 +1,8 @@
 """Evidence that a played motion gave: log-likelihood ratio of the true arm to the arm without the effect, with all of its values fitted.
 
-The residual of the true arm is known here: the encoder's noise. The arm without the effect is fitted by scipy to windows from their true first
-states, with the arm file's standard deviations as prior; constants and slopes, like those of an error of the first state, are left out.
+The residual of the true arm is known here: the encoder's noise. The arm without the effect is fitted by scipy to windows that begin in the states
+that the encoders would show without noise, with the arm file's standard deviations as prior; constants and slopes, like those of an error of the
+first state, are left out.
 """
 
 from __future__ import annotations
@@ -17,17 +18,28 @@ from armgap import _native
 from armgap.trial.simulation.arms import TrialArm
 from armgap.trial.simulation.simulated_arm import Trace
 
+from .cases import Case
+
 Array = NDArray[np.float64]
 
 #: Largest degree of the Legendre polynomials onto which the residuals of a window are projected.
 DEGREES = 12
 #: Largest number of function evaluations of the fit.
 STEPS = 12
-#: Effects of the encoder, which change measured but not true positions.
-MEASURED = ("encoder_offset", "encoder_eccentricity")
 
 
-def obtained(effect: str, arm_file: Path, arm: TrialArm, trace: Trace, horizon: float) -> float:
+def shown(case: Case, trace: Trace) -> tuple[Array, Array]:
+    """Return positions and velocities as the encoders show them without noise, shape (n_samples, n_joints) each."""
+    q, dq = trace.q_true.copy(), trace.dq_true.copy()
+    if case.effect in ("encoder_offset", "encoder_eccentricity"):
+        j, p = (case.joint or 1) - 1, case.parameters
+        a, b = p.get("a", 0.0), p.get("b", 0.0)
+        dq[:, j] *= 1.0 + a * np.cos(q[:, j]) - b * np.sin(q[:, j])
+        q[:, j] += p.get("offset", 0.0) + a * np.sin(q[:, j]) + b * np.cos(q[:, j])
+    return q, dq
+
+
+def obtained(case: Case, arm_file: Path, arm: TrialArm, trace: Trace, horizon: float) -> float:
     """Return the log-likelihood ratio of the true arm to the best fitting arm without the effect, over windows of length `horizon` [s]."""
     stated = armgap.Arm.read(arm_file)
     s = max(round(horizon / arm.sample_period), DEGREES + 2)
@@ -42,6 +54,7 @@ def obtained(effect: str, arm_file: Path, arm: TrialArm, trace: Trace, horizon: 
         return np.stack([column[w * s : w * s + s + 1] for w in range(windows)])
 
     measured = factors(of(trace.q))
+    q, dq = shown(case, trace)
     lengths = None if stated.link_length is None else stated.link_length.tolist()
 
     def left(u: Array) -> Array:
@@ -51,11 +64,11 @@ def obtained(effect: str, arm_file: Path, arm: TrialArm, trace: Trace, horizon: 
         for w in range(windows):
             rows = slice(w * s, w * s + s + 1)
             predicted[w], _ = _native.simulate(
-                stated.kind, stated.gravity, lengths, theta.tolist(), trace.t[rows], trace.tau[rows], trace.q_true[w * s],
-                trace.dq_true[w * s], [], 0.1 * float(weight.min()),
+                stated.kind, stated.gravity, lengths, theta.tolist(), trace.t[rows], trace.tau[rows], q[w * s],
+                dq[w * s], [], 0.1 * float(weight.min()),
             )  # fmt: skip
         return np.concatenate([measured - factors(predicted), u])
 
     found = least_squares(left, np.zeros(len(stated.theta)), diff_step=0.02, max_nfev=STEPS)
-    noise = len(measured) if effect in MEASURED else float(np.sum(factors(of(trace.q - trace.q_true)) ** 2))
+    noise = float(np.sum(factors(of(trace.q - q)) ** 2))
     return float(found.cost - 0.5 * noise)
