@@ -18,10 +18,10 @@ from .cases import CASES, Case, Reference, expected, log_of, multisine, play, po
 from .hypotheses_played import is_followed, played, used
 from .obtained import obtained
 from .sealed import draw
-from .summary import summary
+from .summary import is_settled, summary
 
 #: What a first diagnosis may say of the hidden effect for it to be an open question: a wrong `absent` is a fault of the diagnosis, not of a motion.
-OPEN = ("undecided", "not excited", "candidate", "look-alike", "named, look-alikes")
+OPEN = ("undecided", "not excited", "candidate", "look-alike", "named, look-alikes", "named")
 
 
 def named(diagnosis: armgap.Diagnosis, case: Case) -> tuple[str, float]:
@@ -56,7 +56,8 @@ def one(case: Case, seed: int, duration: float, ask: bool) -> dict[str, Any] | N
             return None
         first = log_of(small, "first")
         before = armgap.diagnose(first, arm_file)
-        if case.machine is not None and named(before, case)[0] not in OPEN:
+        said = named(before, case)
+        if case.machine is not None and (said[0] not in OPEN or is_settled(said)):
             return None
         began = time.perf_counter()
         wanted = [case.asked] if ask else []

@@ -34,7 +34,8 @@ _CLOSE_COST_DIFFERENCE = 1.0
 # where an effect is hidden.
 _UNRELATED = (0.5, 0.25)
 _UNPREDICTED = (0.3, 0.4)
-# Displacement within a window, in standard deviations of a measured position, from which a joint counts as moving where predictions are judged.
+# Displacement within a window, in standard deviations of a measured position, from which a joint counts as moving where predictions are judged: one
+# at rest shows a few of noise and rounding, one that moves thousands.
 _MOVED_NOISES = 10.0
 # Shifts of the torques [samples] that are tried first: torques and positions that predict well with one of them belong to the same motion.
 _SHIFTS = (-8, -5, -2, 2, 5, 8)
@@ -162,23 +163,25 @@ def _strangers(share: Array, now: Examined, horizon: float, pair: int) -> list[C
     shifted torques. The part of a torque that noise of the positions leaves unexplained is not counted. A joint that is at rest wherever predictions
     are judged is held by friction, under any torque up to its break-away torque: it contradicts nothing.
     """
-    worst = int(np.argmax(share))
+    if share.max() < _UNRELATED[pair]:
+        return []
     logs = [*now.training, *now.holdout]
-    if share[worst] < _UNRELATED[pair]:
+    stands = _predicted(Corrections(), now, horizon)
+    judged = stands.motion > _MOVED_NOISES * _resolution(logs, now.arm)
+    share = np.where(judged, share, 0.0)
+    worst = int(np.argmax(share))
+    if share[worst] < _UNRELATED[pair] or stands.relative_on(judged) < _UNPREDICTED[pair]:
         return []
     base = EquationError([Rows.of(log, now.arm) for log in logs], now.arm)
     masks = [rows.moving(log) for log, rows in zip(logs, base.rows, strict=True)]
     limited, fit = drive_limit.limited(base, logs, worst, masks)
     noise = base.noise_square(logs) * np.mean(np.concatenate(masks), axis=0)
-    if (fit.share - noise / np.maximum(limited.square, np.finfo(float).tiny)).max() < drive_limit.LIMITED:
+    left = fit.share - noise / np.maximum(limited.square, np.finfo(float).tiny)
+    if left[judged].max() < drive_limit.LIMITED:
         return []
     period = float(np.median(np.diff(logs[0].t)))
-    stands = _predicted(Corrections(), now, horizon)
-    judged = stands.motion > _MOVED_NOISES * _resolution(logs, now.arm)
-    if not judged[worst]:
-        return []
     shifted = (_predicted(Corrections(shift={"tau": k * period}), now, horizon) for k in _SHIFTS)
-    if any(read.relative_on(judged) < _UNPREDICTED[pair] for read in (stands, *shifted)):
+    if any(read.relative_on(judged) < _UNPREDICTED[pair] for read in shifted):
         return []
     columns = ",".join(f"{kind}{j}=NAME" for kind in ("q", "tau") for j in range(1, now.arm.n_joints + 1))
     message = (
@@ -191,7 +194,7 @@ def _strangers(share: Array, now: Examined, horizon: float, pair: int) -> list[C
 
 def _resolution(logs: Sequence[Log], arm: Arm) -> Array:
     """Return the standard deviation of each joint's measured positions [rad or m]: of their noise, or of the rounding to encoder counts if larger."""
-    noise = np.max([position_noise(log) for log in logs], axis=0)
+    noise = np.median([position_noise(log) for log in logs], axis=0)
     step = np.zeros_like(noise) if arm.encoder_step is None else arm.encoder_step
     return np.asarray(np.maximum(noise, step / math.sqrt(12.0)), dtype=np.float64)
 

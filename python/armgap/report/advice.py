@@ -86,7 +86,7 @@ def _alike(cause: Data, data: Data) -> str:
     if any(e.get("motion_separates", True) for e in cause["equivalents"]):
         text += ", or record another motion" + ("" if _is_serial(data) else ", which armgap plan finds")
         return f"{text}; the section on look-alikes says which of them it may separate."
-    return f"{text}; no motion separates them, and the section on look-alikes says what does."
+    return f"{text}; no motion separates them, and the section on look-alikes says why."
 
 
 def _unexplained(data: Data) -> list[str]:

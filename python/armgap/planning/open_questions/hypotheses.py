@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from armgap import _native
 from armgap.evidence.hypothesis import EffectInstance, at_motor
 from armgap.planning.criterion import HypothesisPair, PredictedMotion, Rest
-from armgap.planning.open_questions.questions import NONE, Question
+from armgap.planning.open_questions.questions import NONE, Question, inseparable
 from armgap.planning.open_questions.sizes import PLANNED, Scales, Shape, levels, shapes
 
 __all__ = ["HypothesisBuilder", "TestedQuestion"]
@@ -106,12 +106,17 @@ class HypothesisBuilder:
         return TestedQuestion(question, pair, quick, size, self._range(question, [e for _, e in groups]))
 
     def _rest_with(self, question: Question) -> Rest | None:
-        """Return what the diagnosis' best model leaves with the effect in question added, where that is less: the gap may be its doing."""
+        """Return what the re-estimated arm leaves with the effect in question added, if no cause is named: the gap may be this effect's doing.
+
+        None, for what the best model leaves, if a cause is named or the effect was not fitted.
+        """
         tried = [e["rms"] for e in self._data.get("ranking") or [] if (e["effect"], e["joint"]) == question.place]
-        if not tried:
+        if not tried or self._data["causes"]:
             return None
-        after = np.array(self._data["gap"]["after"], dtype=np.float64)
-        return Rest.of(np.minimum(after, np.array(tried[0], dtype=np.float64)), self._floor)
+        rests = [
+            Rest.of(np.array(rms, dtype=np.float64), self._floor) for rms in (tried[0], self._data["gap"]["after"])
+        ]
+        return min(rests, key=lambda rest: rest.excess)
 
     def look_alikes(self, tested: TestedQuestion) -> list[Question]:
         """Return questions of an effect against effects that may imitate it, the most similar first.
@@ -128,10 +133,13 @@ class HypothesisBuilder:
             return []
         whole, _ = self._usual.left_of(target)
         modelled = {(e.effect, e.joint) for e in tested.pair.rival}
+        same = inseparable(self._data)
         found = []
         for entry in self._data["ruled_out"]:
             place = (entry["effect"], entry["joint"])
             if place in modelled or place[0] not in PLANNED or place[0] == effect or place[1] not in (None, joint or 1):
+                continue
+            if frozenset((tested.question.place, place)) in same:
                 continue
             left = [self._left_by(e, tested.pair.rival, target) for e in self._tried(place, tested.pair.rival, target)]
             if left and min(left) < IMITATES * whole:

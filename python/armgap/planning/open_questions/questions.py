@@ -67,6 +67,16 @@ class Question:
         return f"{spelt(*self.place)} against {spelt(*self.rival) if self.against != NONE else NONE}"
 
 
+def inseparable(data: Data) -> set[frozenset[tuple[str, int | None]]]:
+    """Return the pairs of a named cause and an equivalent, by effect and joint, that no motion separates."""
+    return {
+        frozenset(((cause["effect"], cause["joint"]), (other["effect"], other["joint"])))
+        for cause in data["causes"]
+        for other in cause["equivalents"]
+        if not other.get("motion_separates", True)
+    }
+
+
 def spelt(effect: str, joint: int | None) -> str:
     """Return an effect in the form of a command-line option, ``EFFECT:JOINT``."""
     return effect if joint is None else f"{effect}:{joint}"
@@ -92,11 +102,10 @@ def open_questions(data: Data) -> tuple[list[Question], list[str]]:
     """
     found: list[Question] = []
     remarks: list[str] = []
-    same: set[tuple[tuple[str, int | None], tuple[str, int | None]]] = set()
+    same = inseparable(data)
     for cause in data["causes"]:
         for other in cause["equivalents"]:
-            if not (separates := other.get("motion_separates", True)):
-                same.add(((cause["effect"], cause["joint"]), (other["effect"], other["joint"])))
+            separates = other.get("motion_separates", True)
             if separates and cause["effect"] in PLANNED and other["effect"] in PLANNED:
                 question = Question(cause["effect"], cause["joint"], other["effect"], other["joint"], "equivalents")
                 found.append(replace(question, estimate=_estimate(cause), why=other.get("why") or ""))
@@ -113,9 +122,9 @@ def open_questions(data: Data) -> tuple[list[Question], list[str]]:
         if entry["status"] not in ("undecided", "not excited") or entry["effect"] not in PLANNED:
             continue
         place, why = (entry["effect"], entry["joint"]), entry.get("why") or ""
-        instead = [
-            c for c in data["causes"] if _would_stand_for(entry, c) and ((c["effect"], c["joint"]), place) not in same
-        ]
+        if any(place in pair for pair in same):
+            continue  # said beside the cause that it is the same as
+        instead = [c for c in data["causes"] if _would_stand_for(entry, c)]
         for cause in instead:
             question = Question(cause["effect"], cause["joint"], *place, "undecided", _estimate(cause))
             found.append(replace(question, why=why))

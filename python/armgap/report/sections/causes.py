@@ -178,5 +178,8 @@ def look_alikes(data: Data) -> Section | None:
     ]
     if not rows:
         return None
-    text = "Each of these would explain the logs as well as the cause it stands beside. Which one it is has to be decided by other means."
+    text = (
+        "Each of these would explain the logs as well as the cause it stands beside. The last column says whether another motion may decide, "
+        "or what else does."
+    )
     return Section("What looks alike", text=[text], tables=[Table(("named", "could also be", "why"), rows)])

@@ -16,7 +16,7 @@ static SPEC: Spec = Spec {
     excited_by: "motion over several cycles of the ripple",
     parameters: &[
         EffectParameter::signed("amplitude", Quantity::Torque),
-        EffectParameter::shape("n", Quantity::Cycles, 1.0, f64::INFINITY),
+        EffectParameter::shape("n", Quantity::Cycles, 0.2, f64::INFINITY),
         EffectParameter::shape("phase", Quantity::Angle, f64::NEG_INFINITY, f64::INFINITY),
     ],
     // Numbers of cycles over the joint's travel; larger numbers are guessed from the residual.

@@ -61,7 +61,10 @@ pub fn effect_instances<const N: usize>(
                 let mut reached = true;
                 for (value, parameter) in effect.p.iter_mut().zip(spec.parameters) {
                     match scales.initial_guess(parameter.quantity, joint, *value) {
-                        Some(initial_guess) => *value = initial_guess.clamp(parameter.lower, parameter.upper),
+                        Some(guess) => {
+                            let lower = parameter.lower.max(scales.fewest_cycles(parameter.quantity, joint));
+                            *value = guess.clamp(lower, parameter.upper);
+                        }
                         None => reached = false,
                     }
                 }

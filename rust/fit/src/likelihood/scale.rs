@@ -165,6 +165,12 @@ impl<const N: usize> Scales<N> {
         most * self.size(quantity, j)
     }
 
+    /// Fewest cycles of a ripple per turn of joint `j` that a fit admits: one per turn, or one over the travel if that is more than a turn. Slower ripples
+    /// bend so little that they imitate an offset. Negative infinity for other quantities.
+    pub fn fewest_cycles(&self, quantity: Quantity, j: usize) -> f64 {
+        if quantity == Quantity::Cycles { self.size(quantity, j).min(1.0) } else { f64::NEG_INFINITY }
+    }
+
     /// Typical sizes of all parameters of an effect on its joint, SI.
     pub fn of(&self, effect: &EffectInstance) -> Vec<f64> {
         effect.law.spec().parameters.iter().map(|p| self.size(p.quantity, effect.joint)).collect()

@@ -195,7 +195,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> FitProblem<'_, A, N, P> 
                 let [least, most] = effect.bounds(i);
                 let reach = self.scales.largest(parameter.quantity, effect.joint);
                 let centre = self.scales.centre(parameter, effect.joint);
-                lower.push(least.max(centre - reach));
+                let slowest = self.scales.fewest_cycles(parameter.quantity, effect.joint);
+                lower.push(least.max(centre - reach).max(slowest));
                 upper.push(most.min(centre + reach));
             }
         }

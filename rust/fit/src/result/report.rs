@@ -299,7 +299,7 @@ pub struct EquivalentSummary {
     pub on: SeveralJoints,
     /// Reason why the effect and the cause cannot be told apart.
     pub why: String,
-    /// Whether another motion may tell them apart; if not, `why` names the measurement that does.
+    /// Whether another motion may tell them apart; if not, `why` says what does, where anything is known to.
     pub motion_separates: bool,
 }
 

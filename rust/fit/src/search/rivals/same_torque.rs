@@ -1,8 +1,9 @@
 //! Whether two effects need the same torque in every state of the arm, so that no motion distinguishes them.
 //!
-//! A cause fixes the torque of every motion. If another effect, at some values of its own and of the arm's parameters, gives the same torque in states
-//! drawn at random, the two models are not distinguishable by any experiment on the joints' positions and torques (structural identifiability: Bellman
-//! and Astrom 1970); only a measured value of a parameter tells them apart. Effects with a memory have no such function and are not compared.
+//! A cause fixes the command of every motion. If another effect, at some values of its own and of the arm's parameters, needs the same commands in
+//! states drawn at random, no experiment on the joints' positions and torques distinguishes the two (structural identifiability: Bellman and Astrom
+//! 1970); only a measured value of a parameter does. Effects with a memory, and drives that limit their torque, are no such functions of the state and
+//! are not compared.
 
 use crate::likelihood::context::DiagnosisContext;
 use crate::model::hypothesis::{EffectInstance, Hypothesis};
@@ -14,17 +15,24 @@ use nalgebra::{DMatrix, DVector, SVector};
 
 /// Number of states in which torques are compared: several times as many as there are values to fit.
 const COMPARED_STATES: usize = 80;
-/// Largest RMS difference of the torques, as a part of the RMS torque of the cause, at which they count as the same. Of 33 look-alikes of causes on
-/// simulated arms the fit leaves at most 0.02 for the 15 that are the same, or become so as a spring's rest position moves away, and at least 0.05 for
-/// the others.
+/// Seed of the states.
+const STATES_SEED: u64 = 80;
+/// Largest RMS difference of the commands, as a part of the RMS command that the cause needs beyond what the arm's parameters imitate, at which they
+/// count as the same. Of 33 look-alikes of causes on simulated arms the fit leaves at most 0.02 for the 15 that are the same, or become so as a
+/// spring's rest position moves away, and at least 0.05 for the others.
 const SAME_TORQUE: f64 = 0.03;
 /// Change of a parameter of the arm, in standard deviations of its prior, from which it is named as what a measurement has to determine.
 const NOTICEABLY_MOVED: f64 = 0.5;
-/// Smallest speed of a state, as a part of the largest: friction is smoothed near rest.
+/// Weight of a change of the arm's parameters by one standard deviation, as a part of [`SAME_TORQUE`]: of equally good fits the nearest counts.
+const HELD_BACK: f64 = 0.01;
+/// Speed that is added to every state's, as a part of the largest: friction is smoothed near rest.
 const LEAST_SPEED: f64 = 0.1;
 /// Half the range of positions of a linear joint, in travels of the logs.
 const TRAVELS: f64 = 2.0;
-/// Largest number of steps of the fit, and of the fixed-point iteration for the command.
+/// Smallest torque scale of a joint, as a part of the largest joint's, and smallest range of positions, rad or m.
+const LEAST_TORQUE: f64 = 1e-3;
+const LEAST_RANGE: f64 = 1e-2;
+/// Largest number of steps of the fit, and of Newton's method for the command.
 const MAX_FIT_STEPS: usize = 100;
 /// Step of finite differences, as a part of a value's scale.
 const STEP: f64 = 1e-5;
@@ -34,15 +42,18 @@ const READING_STEP: f64 = 1e-4;
 /// Readings of the encoders, their rates and accelerations.
 type Reading<const N: usize> = [SVector<f64, N>; 3];
 
-/// Comparison of two effects on one arm by the torques that they need.
+/// States with the commands that the cause needs in them.
+type Commanded<const N: usize> = Vec<(Reading<N>, SVector<f64, N>)>;
+
+/// Comparison of two effects on one arm by the commands that they need.
 pub struct SameTorque<'a, A, const N: usize, const P: usize> {
     /// Model of the arm without effects.
     pub arm: &'a A,
-    /// Reported model, with the cause.
+    /// Reported model.
     pub model: &'a Hypothesis<P>,
     /// Standard deviations of the arm's parameters in the arm file, SI.
     pub sigma: &'a [f64; P],
-    /// Typical speed and torque per joint, SI.
+    /// Typical speed per joint, rad/s or m/s.
     pub speed: [f64; N],
     /// Typical torque per joint, N m or N.
     pub torque: [f64; N],
@@ -51,33 +62,56 @@ pub struct SameTorque<'a, A, const N: usize, const P: usize> {
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> SameTorque<'_, A, N, P> {
-    /// Indices of the arm's parameters at whose other values `other` needs the torques of `cause` in every state; `None` if it does not, or if a
-    /// torque depends on more than the state.
+    /// Indices of the arm's parameters at whose other values `other` needs the commands of `cause` in every state; `None` if it does not, or if a
+    /// command depends on more than the state.
+    ///
+    /// A cause that the arm's parameters alone imitate is the same as `other` if they imitate that as well: what the two change is a parameter.
     pub fn moved(&self, cause: &EffectInstance, other: &EffectInstance) -> Option<Vec<usize>> {
         if !is_static(cause) || !is_static(other) {
             return None;
         }
-        let at = self.model.effects.iter().position(|e| e.same_place(cause))?;
-        let rest: Vec<EffectInstance> = self.model.effects.iter().filter(|e| is_static(e)).copied().collect();
-        let with = Hypothesis { effects: rest, ..self.model.clone() };
-        let mut without = with.clone();
-        without.effects.retain(|e| !e.same_place(&self.model.effects[at]));
-        let states = self.states();
-        let commands: Vec<SVector<f64, N>> =
-            states.iter().map(|state| self.command(&with, state)).collect::<Option<_>>()?;
-        let own = self.residuals(&without, &states, &commands)?.norm();
-        if own <= 0.0 {
-            return None;
-        }
-        let start = without.with(*other);
-        let found = self.fitted(&start, &states, &commands, SAME_TORQUE * own)?;
-        let moved = |i: &usize| (found.theta[*i] - with.theta[*i]).abs() > NOTICEABLY_MOVED * self.sigma[*i];
+        let mut without = self.model.clone();
+        without.effects.retain(|e| is_static(e) && !e.same_place(cause) && !e.same_place(other));
+        let (states, own) = self.commanded(&without, cause)?;
+        let arm: Vec<usize> = (0..P).collect();
+        let bare = self.fitted(&without, &states, &arm, SAME_TORQUE * own)?;
+        let found = if bare.left <= SAME_TORQUE * own {
+            let (beside, its_own) = self.commanded(&without, other)?;
+            let imitated = self.fitted(&without, &beside, &arm, SAME_TORQUE * its_own)?;
+            if imitated.left > SAME_TORQUE * its_own {
+                return None;
+            }
+            self.fitted(&without.with(*other), &states, &arm, 0.0)?
+        } else {
+            let enough = SAME_TORQUE * bare.left;
+            let start = without.with(*other);
+            let free: Vec<usize> =
+                (0..P).chain(start.values().len() - other.len()..start.values().len()).collect();
+            let found = self.fitted(&start, &states, &free, enough)?;
+            if found.left > enough {
+                return None;
+            }
+            found
+        };
+        let moved = |i: &usize| {
+            (found.model.theta[*i] - self.model.theta[*i]).abs() > NOTICEABLY_MOVED * self.sigma[*i]
+        };
         Some((0..P).filter(moved).collect())
     }
 
-    /// States drawn over the range of positions and twice the typical speeds, with the accelerations of twice the typical torques.
+    /// States, with the commands that `effect` beside the model `without` needs in them, and the norm of what `without` leaves of these; `None` if
+    /// nothing is left, or if too few states have a command.
+    fn commanded(&self, without: &Hypothesis<P>, effect: &EffectInstance) -> Option<(Commanded<N>, f64)> {
+        let with = without.with(*effect);
+        let needed = |state: Reading<N>| Some((state, self.command(&with, &state)?));
+        let states: Commanded<N> = self.states().into_iter().filter_map(needed).collect();
+        let own = self.missing(without, &states)?.norm();
+        (own > 0.0 && 2 * states.len() > COMPARED_STATES).then_some((states, own))
+    }
+
+    /// States drawn over the range of positions and about twice the typical speeds, with the accelerations of twice the typical torques.
     fn states(&self) -> Vec<Reading<N>> {
-        let mut random = Random(COMPARED_STATES as u64);
+        let mut random = Random(STATES_SEED);
         let mut uniform = || 2.0 * random.below(1 << 30) as f64 / f64::from(1 << 30) - 1.0;
         let inertia = self.arm.inertia(&self.model.theta, &SVector::zeros());
         let mut one = || {
@@ -99,7 +133,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> SameTorque<'_, A, N, P> 
     fn command(&self, model: &Hypothesis<P>, reading: &Reading<N>) -> Option<SVector<f64, N>> {
         let mut tau = SVector::zeros();
         for _ in 0..MAX_FIT_STEPS {
-            let missing = self.residual(model, reading, &tau)?;
+            let missing = self.beyond(model, reading, &tau)?;
             tau += missing;
             if missing.norm() < 1e-9 * (1.0 + tau.norm()) {
                 return Some(tau);
@@ -108,8 +142,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> SameTorque<'_, A, N, P> 
         None
     }
 
-    /// Torque that a motion needs under `model` beyond what the command `tau` delivers.
-    fn residual(
+    /// Command that a motion needs under `model` beyond `tau`, to first order.
+    fn beyond(
         &self,
         model: &Hypothesis<P>,
         reading: &Reading<N>,
@@ -127,74 +161,88 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> SameTorque<'_, A, N, P> 
                 q[j] = at;
             }
         }
-        let held: [[InputSegment<f64>; N]; 1] = [std::array::from_fn(|j| InputSegment::held(tau[j]))];
-        let delivered = model.command(&[0.0], &held, &[], &[]).map_or(held[0], |rows| rows[0]);
-        let delivered = SVector::from_fn(|j, _| delivered[j].mean());
+        let delivered = |tau: SVector<f64, N>| {
+            let held: [[InputSegment<f64>; N]; 1] = [std::array::from_fn(|j| InputSegment::held(tau[j]))];
+            let rows = model.command(&[0.0], &held, &[], &[]).map_or(held[0], |rows| rows[0]);
+            SVector::<f64, N>::from_fn(|j, _| rows[j].mean())
+        };
+        let reached = delivered(*tau);
         let plant = model.plant(self.arm)?;
-        Some(plant.residual_torque(0.0, [&q, &dq, &ddq], &delivered, &LatentState::none(q)))
+        let residual = plant.residual_torque(0.0, [&q, &dq, &ddq], &reached, &LatentState::none(q));
+        let step = SVector::from(self.torque);
+        let gain = (delivered(tau + step) - reached).component_div(&step);
+        let beyond = residual.component_div(&gain);
+        beyond.iter().all(|x| x.is_finite()).then_some(beyond)
     }
 
-    /// Residual torques in all states under their commands, each relative to the joint's typical torque.
-    fn residuals(
-        &self,
-        model: &Hypothesis<P>,
-        states: &[Reading<N>],
-        commands: &[SVector<f64, N>],
-    ) -> Option<DVector<f64>> {
+    /// Commands that `model` needs beyond those of the states, each relative to the joint's typical torque.
+    fn missing(&self, model: &Hypothesis<P>, states: &Commanded<N>) -> Option<DVector<f64>> {
         let mut all = Vec::with_capacity(N * states.len());
-        for (state, tau) in states.iter().zip(commands) {
-            let residual = self.residual(model, state, tau)?;
-            all.extend((0..N).map(|j| residual[j] / self.torque[j]));
+        for (state, tau) in states {
+            let beyond = self.beyond(model, state, tau)?;
+            all.extend((0..N).map(|j| beyond[j] / self.torque[j]));
         }
-        Some(DVector::from_vec(all)).filter(|all| all.iter().all(|x| x.is_finite()))
+        Some(DVector::from_vec(all))
     }
 
-    /// The model with the arm's parameters and its last effect fitted to the commands (Levenberg 1944, Marquardt 1963); `None` if residual torques
-    /// larger than `enough` remain.
+    /// The model with its `free` values fitted to the states' commands (Levenberg 1944, Marquardt 1963), until at most `enough` is left.
+    ///
+    /// The arm's parameters are drawn weakly to those of the reported model, so that of equally good fits the nearest is found.
     fn fitted(
         &self,
         start: &Hypothesis<P>,
-        states: &[Reading<N>],
-        commands: &[SVector<f64, N>],
+        states: &Commanded<N>,
+        free: &[usize],
         enough: f64,
-    ) -> Option<Hypothesis<P>> {
-        let all = start.values();
-        let free: Vec<usize> = (0..P)
-            .chain(all.len() - start.effects.last().map_or(0, EffectInstance::len)..all.len())
-            .collect();
-        let scale: Vec<f64> = free.iter().map(|&i| self.scale(i, &all)).collect();
-        let (mut values, mut damping) = (all, 1e-3);
-        let mut left = self.residuals(start, states, commands)?;
+    ) -> Option<Fitted<P>> {
+        let bounds = bounds(start);
+        let scale: Vec<f64> = free.iter().map(|&i| self.scale(i, &start.values())).collect();
+        let back = HELD_BACK * SAME_TORQUE * self.missing(start, states)?.norm();
+        let residual = |values: &[f64]| -> Option<(f64, DVector<f64>)> {
+            let missing = self.missing(&start.with_values(values), states)?;
+            let held = (0..P).map(|i| back * (values[i] - self.model.theta[i]) / self.sigma[i]);
+            Some((
+                missing.norm(),
+                DVector::from_iterator(missing.len() + P, missing.iter().copied().chain(held)),
+            ))
+        };
+        let (mut values, mut damping) = (start.values(), 1e-3);
+        let (mut left, mut rows) = residual(&values)?;
         for _ in 0..MAX_FIT_STEPS {
-            if left.norm() <= enough {
-                return Some(start.with_values(&values));
+            if left <= enough {
+                break;
             }
-            let mut jacobian = DMatrix::zeros(left.len(), free.len());
+            let mut jacobian = DMatrix::zeros(rows.len(), free.len());
             for (k, (&i, scale)) in free.iter().zip(&scale).enumerate() {
                 let mut beside = values.clone();
-                beside[i] += STEP * scale;
-                let there = self.residuals(&start.with_values(&beside), states, commands)?;
-                jacobian.set_column(k, &((there - &left) / STEP));
+                let step = if beside[i] + STEP * scale > bounds[i][1] { -STEP } else { STEP };
+                beside[i] += step * scale;
+                jacobian.set_column(k, &((residual(&beside)?.1 - &rows) / step));
             }
-            let (gram, slope) = (jacobian.tr_mul(&jacobian), jacobian.tr_mul(&left));
+            let (gram, slope) = (jacobian.tr_mul(&jacobian), jacobian.tr_mul(&rows));
             let ridge = DMatrix::from_diagonal(&gram.diagonal().map(|x| x.max(1e-12)));
-            let tried = loop {
-                let step = (&gram + &ridge * damping).cholesky()?.solve(&slope);
-                let mut moved = values.clone();
-                for ((&i, scale), step) in free.iter().zip(&scale).zip(step.iter()) {
-                    moved[i] = Self::admissible(i, values[i] - scale * step, start);
+            let mut fell = 0.0;
+            while fell == 0.0 && damping < 1e8 {
+                let step = (&gram + &ridge * damping).cholesky().map(|factor| factor.solve(&slope));
+                let mut next = values.clone();
+                for (k, &i) in free.iter().enumerate() {
+                    let step = step.as_ref().map_or(0.0, |step| step[k]);
+                    next[i] = (values[i] - scale[k] * step).clamp(bounds[i][0], bounds[i][1]);
                 }
-                let there = self.residuals(&start.with_values(&moved), states, commands);
-                match there {
-                    Some(there) if there.norm() < left.norm() => break Some((moved, there)),
-                    _ if damping > 1e8 => break None,
+                match residual(&next) {
+                    Some((there, lower)) if lower.norm() < rows.norm() => {
+                        fell = 1.0 - lower.norm() / rows.norm();
+                        (values, left, rows) = (next, there, lower);
+                        damping = (0.1 * damping).max(1e-9);
+                    }
                     _ => damping *= 10.0,
                 }
-            };
-            let (moved, there) = tried?;
-            (values, left, damping) = (moved, there, damping / 10.0);
+            }
+            if fell < STEP {
+                break;
+            }
         }
-        None
+        Some(Fitted { model: start.with_values(&values), left })
     }
 
     /// Typical size of free value `i`: standard deviation of a parameter of the arm, present size of an effect's value.
@@ -202,17 +250,22 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> SameTorque<'_, A, N, P> 
         let size = values[i].abs();
         if i < P { self.sigma[i].max(0.01 * size).max(1e-9) } else { (0.1 * size).max(1e-6) }
     }
+}
 
-    /// The value `x` of free value `i` kept within its bounds: positive parameters of the arm stay positive.
-    fn admissible(i: usize, x: f64, start: &Hypothesis<P>) -> f64 {
-        if i < P {
-            return if start.theta[i] > 0.0 { x.max(1e-3 * start.theta[i]) } else { x };
-        }
-        let first = start.values().len() - start.effects.last().map_or(0, EffectInstance::len);
-        let Some(effect) = start.effects.last() else { return x };
-        let [low, high] = effect.bounds(i - first);
-        x.clamp(low, high)
-    }
+/// Result of a fit to commands.
+struct Fitted<const P: usize> {
+    /// The fitted model.
+    model: Hypothesis<P>,
+    /// Norm of the commands that it leaves missing.
+    left: f64,
+}
+
+/// Lower and upper bounds of a model's values: positive parameters of the arm stay positive.
+fn bounds<const P: usize>(model: &Hypothesis<P>) -> Vec<[f64; 2]> {
+    let arm =
+        model.theta.iter().map(|x| [if *x > 0.0 { 1e-3 * x } else { f64::NEG_INFINITY }, f64::INFINITY]);
+    let effects = model.effects.iter().flat_map(|e| (0..e.len()).map(|i| e.bounds(i)));
+    arm.chain(effects).collect()
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
@@ -224,26 +277,31 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     ) -> SameTorque<'a, A, N, P> {
         let range = std::array::from_fn(|j| {
             let [low, high] = self.scales.travel[j];
-            let half = if rotary { std::f64::consts::PI } else { TRAVELS * (high - low) };
+            let half = if rotary { std::f64::consts::PI } else { (TRAVELS * (high - low)).max(LEAST_RANGE) };
             [0.5 * (low + high) - half, 0.5 * (low + high) + half]
         });
+        let torque: [f64; N] = std::array::from_fn(|j| self.scales.torque[j]);
+        let most = torque.iter().copied().fold(0.0, f64::max);
+        let most = if most > 0.0 { most } else { 1.0 };
         SameTorque {
             arm: &self.arm,
             model,
             sigma: &self.prior.sigma,
             speed: std::array::from_fn(|j| self.scales.size(Quantity::Speed, j)),
-            torque: std::array::from_fn(|j| self.scales.size(Quantity::Torque, j)),
+            torque: torque.map(|torque| torque.max(LEAST_TORQUE * most)),
             range,
         }
     }
 }
 
-/// Whether the torque of an effect of the library is a function of the joints' state and the command alone.
+/// Whether the command that an effect of the library needs is a function of the joints' state alone.
 fn is_static(effect: &EffectInstance) -> bool {
     let spec = effect.law.spec();
     let in_time = |quantity| matches!(quantity, Quantity::Time | Quantity::Duration | Quantity::Impulse);
+    let limits_command = spec.hooks.command && spec.trial == Trial::Whole;
     find::<f64>(spec.name).is_some()
         && spec.trial != Trial::Disturbance
+        && !limits_command
         && !spec.hooks.memory
         && !effect.law.has_transmission()
         && !spec.parameters.iter().any(|p| in_time(p.quantity))
@@ -293,6 +351,27 @@ mod tests {
         let gain = effect("torque_gain", [0.5, 0.0, 0.0]);
         let found = moved(gain, effect("payload", [1.5, 0.4, 0.0])).expect("a payload with other friction");
         assert!(found.contains(&"viscous1") && found.contains(&"coulomb1"), "{found:?}");
+        assert!(!moved(gain, effect("rotor_inertia", [0.02, 0.0, 0.0])).expect("another inertia").is_empty());
+    }
+
+    #[test]
+    fn a_gain_as_look_alike_is_not_the_same_for_growing_small() {
+        let gain = effect("torque_gain", [1.1, 0.0, 0.0]);
+        for cause in [
+            effect("stribeck", [0.4, 1.0, 0.0]),
+            effect("quadratic_drag", [0.1, 0.0, 0.0]),
+            effect("cubic_drag", [0.02, 0.0, 0.0]),
+        ] {
+            assert_eq!(moved(cause, gain), None, "{cause:?}");
+        }
+    }
+
+    #[test]
+    fn a_cause_that_parameters_imitate_is_not_the_same_as_an_effect_that_they_do_not() {
+        let gain = effect("torque_gain", [0.9, 0.0, 0.0]);
+        assert_eq!(moved(gain, effect("torque_ripple", [0.3, 3.0, 0.5])), None);
+        assert_eq!(moved(gain, effect("stribeck", [0.4, 1.0, 0.0])), None);
+        assert_eq!(moved(gain, effect("joint_spring", [0.3, 0.5, 0.0])), None);
     }
 
     #[test]
