@@ -57,7 +57,7 @@ impl CauseValue {
 }
 
 /// Joints of a cause that acts on several joints, or on a sum or difference of two; empty for a cause on one joint or on the whole arm.
-#[derive(Debug, Clone, Default, JsonSchema, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, JsonSchema, Serialize)]
 pub struct SeveralJoints {
     /// 1-based numbers of the joints that a cause on several joints acts on.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -15,6 +15,16 @@ pub struct Equivalent {
     pub motion_separates: bool,
 }
 
+/// Why a torque offset and a Coulomb friction that differs by direction are the same to every motion, beside another Coulomb coefficient.
+const SAME_WHILE_MOVING: &str =
+    "the same function of time while the joint moves; a reading at rest with the motor off separates them";
+
+/// Why no motion of any arm distinguishes the effects named `a` and `b` on the same joints; `None` if one may.
+pub fn on_same_joints(a: &str, b: &str) -> Option<&'static str> {
+    matches!((a, b), ("torque_offset", "coulomb_asymmetry") | ("coulomb_asymmetry", "torque_offset"))
+        .then_some(SAME_WHILE_MOVING)
+}
+
 /// Effects that give the same motion as `effect` on an arm with `joints` joints, under any torques.
 pub fn known(effect: &EffectInstance, joints: usize) -> Vec<Equivalent> {
     let joint = effect.joint_number();
@@ -22,16 +32,8 @@ pub fn known(effect: &EffectInstance, joints: usize) -> Vec<Equivalent> {
         vec![Equivalent { effect, joint, why: why.to_owned(), motion_separates: false }]
     };
     match effect.law.spec().name {
-        "coulomb_asymmetry" => one(
-            "torque_offset",
-            joint,
-            "the same function of time while the joint moves; a reading at rest with the motor off separates them",
-        ),
-        "torque_offset" => one(
-            "coulomb_asymmetry",
-            joint,
-            "the same function of time while the joint moves; a reading at rest with the motor off separates them",
-        ),
+        "coulomb_asymmetry" => one("torque_offset", joint, SAME_WHILE_MOVING),
+        "torque_offset" => one("coulomb_asymmetry", joint, SAME_WHILE_MOVING),
         "base_tilt" => one(
             "encoder_offset",
             Some(1),
@@ -121,6 +123,8 @@ mod tests {
             assert!(!are(&placed(a, i), &placed(b, j), 2), "{a} {b}");
         }
         assert!(are(&placed("torque_gain", 0), &placed("torque_gain", 1), 2));
+        assert!(on_same_joints("torque_offset", "coulomb_asymmetry").is_some());
+        assert!(on_same_joints("torque_offset", "joint_spring").is_none());
         let found = [placed("hardening_spring", 0), placed("torque_ripple", 0), placed("payload", 0)];
         let moved = |other: &EffectInstance| match other.law.spec().name {
             "hardening_spring" => Some(Vec::new()),

@@ -3,6 +3,7 @@
 use crate::result::report::{
     Bound, Cause, CauseValue, EquivalentSummary, Named, RuledOut, SeveralJoints, Status, Value, Values,
 };
+use crate::search::rivals::equivalent::on_same_joints;
 use crate::serial::constants::{CONSEQUENCE, NOTICED, ROUNDED_BY_LOW_PASS};
 use crate::serial::controller::PositionController;
 use crate::serial::result::controller_report::behind_controller;
@@ -89,12 +90,16 @@ pub(in crate::serial) fn cause(
     controller: Option<&PositionController>,
 ) -> Cause {
     let term = &named.term;
-    let alike = |t: &Term| EquivalentSummary {
-        effect: t.name(),
-        joint: t.joint(),
-        on: several(t),
-        why: LOOK_ALIKE.to_owned(),
-        motion_separates: true,
+    let alike = |t: &Term| {
+        let same = on_same_joints(term.name(), t.name()).filter(|_| several(t) == several(term));
+        let same = same.filter(|_| t.joint() == term.joint());
+        EquivalentSummary {
+            effect: t.name(),
+            joint: t.joint(),
+            on: several(t),
+            why: same.unwrap_or(LOOK_ALIKE).to_owned(),
+            motion_separates: same.is_none(),
+        }
     };
     let mut cause = Cause {
         effect: term.name(),
