@@ -221,8 +221,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> SameTorque<'_, A, N, P> 
             }
             let (gram, slope) = (jacobian.tr_mul(&jacobian), jacobian.tr_mul(&rows));
             let ridge = DMatrix::from_diagonal(&gram.diagonal().map(|x| x.max(1e-12)));
-            let mut fell = 0.0;
-            while fell == 0.0 && damping < 1e8 {
+            let mut fell: Option<f64> = None;
+            while fell.is_none() && damping < 1e8 {
                 let step = (&gram + &ridge * damping).cholesky().map(|factor| factor.solve(&slope));
                 let mut next = values.clone();
                 for (k, &i) in free.iter().enumerate() {
@@ -231,14 +231,14 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> SameTorque<'_, A, N, P> 
                 }
                 match residual(&next) {
                     Some((there, lower)) if lower.norm() < rows.norm() => {
-                        fell = 1.0 - lower.norm() / rows.norm();
+                        fell = Some(1.0 - lower.norm() / rows.norm());
                         (values, left, rows) = (next, there, lower);
                         damping = (0.1 * damping).max(1e-9);
                     }
                     _ => damping *= 10.0,
                 }
             }
-            if fell < STEP {
+            if fell.is_none_or(|fell| fell < STEP) {
                 break;
             }
         }
