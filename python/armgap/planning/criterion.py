@@ -114,12 +114,9 @@ class Setting:
         sigma = np.maximum(np.array(noise["position_sigma"], dtype=np.float64), 1e-12)
         step = np.array(noise.get("encoder_step") or np.zeros(len(sigma)), dtype=np.float64)
         rest = Rest.of(np.array(gap["after"], dtype=np.float64), np.array(gap["floor"], dtype=np.float64))
-        values = data["parameters"]
-        known = [
-            values["with_causes"][name]["sigma"] / values["nominal"][name]["sigma"]
-            for name in model.arm.parameter_names
-        ]
-        unknown = np.clip(np.array(known, dtype=np.float64) ** 2, 0.0, 1.0)
+        found = data["parameters"]["with_causes"]
+        known = np.array([found[name]["sigma"] for name in model.arm.parameter_names], dtype=np.float64)
+        unknown = np.clip((known / np.maximum(model.arm.sigma, 1e-300)) ** 2, 0.0, 1.0)
         return cls(model, float(gap["horizon_s"]), sigma, step, rest, unknown)
 
     @property
