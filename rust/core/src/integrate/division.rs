@@ -3,7 +3,7 @@
 //! Regularised friction is stiff where a joint is near standstill, and constant where it slides. While all joints slide, steps are as long as the
 //! rest of the plant allows; from a step at whose end a joint no longer slides, the interval is divided again.
 
-use super::{Interval, State, fixed_mode_step, substep};
+use super::{Interval, State, fixed_mode_step, max_events, substep};
 use crate::arm::Arm;
 use crate::plant::{Plant, StepRates};
 use crate::real::{Real, lit};
@@ -45,20 +45,34 @@ pub(crate) struct Division<T> {
     near_standstill: usize,
     /// Length of a step, s.
     pub(crate) h: T,
+    /// Number of events that the interval may still have: a joint that chatters, in every step as well, costs no more than one that chatters once.
+    pub(crate) events: usize,
 }
 
 impl<T: Real> Division<T> {
-    /// Division of an interval of `h` seconds; `all_slide` says whether all joints with regularised friction slide at its start.
-    pub(crate) fn new(h: T, rates: &StepRates<T>, limits: StepLimits, all_slide: bool) -> Self {
+    /// Division of an interval of `h` seconds, with at most `events` events; `all_slide` says whether all joints with regularised friction slide at
+    /// its start.
+    pub(crate) fn new(
+        h: T,
+        rates: &StepRates<T>,
+        limits: StepLimits,
+        all_slide: bool,
+        events: usize,
+    ) -> Self {
         let elsewhere = substeps(h * rates.elsewhere, STABLE, limits.elsewhere);
         let near_standstill = elsewhere.max(substeps(h * rates.friction, RESOLVED, limits.near_standstill));
         let count = if all_slide { elsewhere } else { near_standstill };
-        Self { index: 0, count, near_standstill, h: h / lit(count as f64) }
+        Self { index: 0, count, near_standstill, h: h / lit(count as f64), events }
+    }
+
+    /// Division of an interval of `h` seconds into `count` steps, with at most `events` events.
+    pub(crate) fn equal(h: T, count: usize, events: usize) -> Self {
+        Self { index: 0, count, near_standstill: count, h: h / lit(count as f64), events }
     }
 
     /// One step of zero length.
     pub(crate) fn empty() -> Self {
-        Self { index: 0, count: 1, near_standstill: 1, h: T::zero() }
+        Self { index: 0, count: 1, near_standstill: 1, h: T::zero(), events: 0 }
     }
 
     /// Time from the start of the interval to the start of the step, s.
@@ -97,13 +111,14 @@ pub fn advance_in_stable_steps<T: Real, A: Arm<T, N, P>, const N: usize, const P
     if interval.h <= T::zero() {
         return;
     }
-    let mut division = Division::new(interval.h, rates, limits, plant.all_slide(&state.dq, &state.latent));
+    let mut division =
+        Division::new(interval.h, rates, limits, plant.all_slide(&state.dq, &state.latent), max_events(N));
     if division.count == 1 && plant.is_plain() && fixed_mode_step(plant, state, interval) {
         return;
     }
     loop {
         let start = *state;
-        substep(plant, state, interval, division.from(), division.h);
+        substep(plant, state, interval, &mut division);
         if division.needs_sliding() && !keep_sliding(plant, &start, state) {
             *state = start;
             division.refine();

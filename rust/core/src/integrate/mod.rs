@@ -24,9 +24,9 @@ pub(crate) use division::{Division, keep_sliding};
 pub use division::{StepLimits, advance_in_stable_steps, largest_stable_rate};
 use nalgebra::SVector;
 
-/// Largest number of events located within one step, after which joints that change the sign of their velocity are stopped and the rest of the step
-/// is taken: 8 per joint, at least 16.
-const fn max_events(joints: usize) -> usize {
+/// Largest number of events located within one sample interval, or within one step where the number of steps is prescribed; after these events, steps
+/// are taken whole, and joints that change the sign of their velocity are stopped at their ends. 8 per joint, at least 16.
+pub(crate) const fn max_events(joints: usize) -> usize {
     if joints < 2 { 16 } else { 8 * joints }
 }
 
@@ -97,25 +97,28 @@ pub fn advance<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize>(
     if count == 1 && plant.is_plain() && fixed_mode_step(plant, state, interval) {
         return;
     }
-    let dt = interval.h / lit(count as f64);
-    for i in 0..count {
-        substep(plant, state, interval, dt * lit(i as f64), dt);
+    let mut division = Division::equal(interval.h, count, count * max_events(N));
+    loop {
+        substep(plant, state, interval, &mut division);
+        if !division.next() {
+            return;
+        }
     }
 }
 
-/// Advances `state` over a part of a sample interval, `dt` seconds from `from` seconds after the sample.
+/// Advances `state` over the next step of a divided sample interval.
 #[inline]
 pub(crate) fn substep<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize>(
     plant: &Plant<T, A, N, P>,
     state: &mut State<T, N>,
     interval: &Interval<T, N>,
-    from: T,
-    dt: T,
+    division: &mut Division<T>,
 ) {
+    let (from, dt) = (division.from(), division.h);
     if (0..N).all(|j| plant.is_rounded(j)) && !plant.drivetrain().has_backlash() {
         *state = SubStep::new(plant, interval, state).smooth(state, from, dt);
     } else {
-        SubStep::new(plant, interval, state).exact(state, from, dt);
+        SubStep::new(plant, interval, state).exact(state, from, dt, &mut division.events);
     }
 }
 
@@ -156,7 +159,8 @@ pub(crate) fn exact<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize>(
     interval: &Interval<T, N>,
     done: T,
 ) {
-    SubStep::new(plant, interval, state).exact(state, done, interval.h - done);
+    let mut events = max_events(N);
+    SubStep::new(plant, interval, state).exact(state, done, interval.h - done, &mut events);
 }
 
 /// Plant, sample interval and initial kinematic state of one integration step.
@@ -241,11 +245,13 @@ impl<'a, T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'a, T
         self.runge_kutta(state, x, dt, &k1)
     }
 
-    /// Integrates a step of `dt` seconds with exact dry friction, from event to event.
+    /// Integrates a step of `dt` seconds with exact dry friction, from event to event; `events` is the number of events that the sample interval may
+    /// still have, beyond which the step ends in one piece.
     #[inline]
-    fn exact(&self, state: &mut State<T, N>, from: T, dt: T) {
+    fn exact(&self, state: &mut State<T, N>, from: T, dt: T, events: &mut usize) {
         let (mut x, mut left) = (from, dt);
-        for _ in 0..max_events(N) {
+        while *events > 0 {
+            *events -= 1;
             let k1 = self.settle(state, x);
             let trial = self.runge_kutta(state, x, left, &k1);
             let trial_step = TrialStep { state, x, dt: left, k1: &k1 };

@@ -8,7 +8,7 @@ use super::elastic_lanes::{ElasticLanes, ElasticModes, ElasticSpan, ElasticState
 use super::{Run, WIDTH};
 use crate::arm::Arm;
 use crate::cpu::{Cpu, Kernel, Level};
-use crate::integrate::{Division, State, StepLimits, keep_sliding, substep};
+use crate::integrate::{Division, State, StepLimits, keep_sliding, max_events, substep};
 use crate::kinematics::JointState;
 use crate::lanes::Lanes;
 use crate::linear::free_inertia;
@@ -140,7 +140,8 @@ impl<'r, 'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, c
             let state = self.state_of(l);
             let rates = plant.step_rates_with(&state.q, &lane_values(free, l));
             let all_slide = plant.all_slide(&state.dq, &state.latent);
-            self.divisions[l] = Division::new(interval.h, &rates, self.rollout.step_limits, all_slide);
+            self.divisions[l] =
+                Division::new(interval.h, &rates, self.rollout.step_limits, all_slide, max_events(N));
             self.set_span(l);
         }
     }
@@ -170,11 +171,11 @@ impl<'r, 'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, c
     #[inline(never)]
     fn take_alone(&mut self, l: usize) {
         let Some(RunCursor { interval: Some(interval), .. }) = &self.cursors[l] else { return };
-        let (plant, division) = (self.lanes.plant(), self.divisions[l]);
+        let plant = self.lanes.plant();
         let start = self.state_of(l);
         let mut state = start;
-        substep(plant, &mut state, interval, division.from(), division.h);
-        if division.needs_sliding() && !keep_sliding(plant, &start, &state) {
+        substep(plant, &mut state, interval, &mut self.divisions[l]);
+        if self.divisions[l].needs_sliding() && !keep_sliding(plant, &start, &state) {
             return self.refine(l);
         }
         self.set(l, &state);

@@ -17,9 +17,12 @@ use rayon::prelude::*;
 /// Displacement of a candidate's tested parameter for derivatives by forward differences, relative to the parameter's initial guess.
 const TRIAL: f64 = 1e-3;
 
-/// One in this many initial guesses of a transmission is tried with encoder or friction on the motor's side where the model already has effects: the
+/// One in this many initial guesses of a transmission is tried with encoder and friction on the motor's side where the model already has effects: the
 /// latent states before a window take as long to simulate as the window itself.
 const MOTOR_GUESSES: usize = 3;
+
+/// One in this many initial guesses of backlash is tried with encoder and friction on different sides while the model has no effects.
+const MIXED_GUESSES: usize = 2;
 
 /// Score test of a candidate at one initial guess.
 #[derive(Debug, Clone)]
@@ -44,8 +47,8 @@ pub struct ScoreTest {
     pub distinct: f64,
 }
 
-/// Every effect of the library on every joint it can act on, at each initial guess; a transmission with encoder and friction both on the link's
-/// side and both on the motor's side, as far as `sides` allows.
+/// Every effect of the library on every joint it can act on, at each initial guess; a transmission with encoder and friction on the sides
+/// that `sides` allows.
 pub fn effect_instances<const N: usize>(
     scales: &Scales<N>,
     sides: &[Vec<Sides>; N],
@@ -79,8 +82,14 @@ pub fn effect_instances<const N: usize>(
                     all.push(effect);
                     continue;
                 }
-                for sides in whole(&sides[joint]) {
-                    if all_guesses || *sides == Sides::LINK || guess % MOTOR_GUESSES == MOTOR_GUESSES / 2 {
+                for sides in tried(&sides[joint], effect.is_backlash()) {
+                    let one_in = match (all_guesses, sides.encoder_at_motor == sides.friction_at_motor) {
+                        _ if *sides == Sides::LINK => 1,
+                        (true, true) => 1,
+                        (true, false) => MIXED_GUESSES,
+                        (false, _) => MOTOR_GUESSES,
+                    };
+                    if guess % one_in == one_in / 2 {
                         all.push(effect.with_sides(*sides));
                     }
                 }
@@ -90,10 +99,11 @@ pub fn effect_instances<const N: usize>(
     all
 }
 
-/// Sides with encoder and friction together on one side and a geared rotor; all given sides if there are none of this kind.
-fn whole(sides: &[Sides]) -> Vec<&Sides> {
-    let both = |s: &&Sides| s.encoder_at_motor == s.friction_at_motor && !s.rotor_rides;
-    let found: Vec<&Sides> = sides.iter().filter(both).collect();
+/// Sides of encoder and friction with which a transmission is tried, all with a geared rotor: both on one side, and for backlash also on different
+/// sides, as an elastic joint is recognised with wrong sides and backlash is not. All given sides if there are none of this kind.
+fn tried(sides: &[Sides], backlash: bool) -> Vec<&Sides> {
+    let geared = |s: &&Sides| !s.rotor_rides && (backlash || s.encoder_at_motor == s.friction_at_motor);
+    let found: Vec<&Sides> = sides.iter().filter(geared).collect();
     if found.is_empty() { sides.iter().collect() } else { found }
 }
 
@@ -235,5 +245,53 @@ impl ScoreTest {
             Trial::Ray => self.effect.p[i] / candidate.p[i],
             Trial::Whole | Trial::Disturbance => 1.0,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Arrangements of encoder and friction (both at the link, both at the motor, on different sides) with which an effect is tried on the first of
+    /// two joints, and how often.
+    fn arrangements(name: &str, all_guesses: bool) -> [usize; 3] {
+        let scales = Scales {
+            torque: [1.0; 2],
+            speed: [1.0; 2],
+            position: [0.5; 2],
+            travel: [[-1.0, 1.0]; 2],
+            inertia: [0.1; 2],
+            period: 0.002,
+            length: 0.3,
+            gravity: 9.81,
+        };
+        let sides = [true, false].into_iter().flat_map(|encoder_at_motor| {
+            [true, false].map(|friction_at_motor| Sides {
+                encoder_at_motor,
+                friction_at_motor,
+                ..Sides::LINK
+            })
+        });
+        let sides: Vec<Sides> = sides.collect();
+        let all = effect_instances(&scales, &[sides.clone(), sides], all_guesses);
+        let own = all.iter().filter(|e| e.law.spec().name == name && e.joint == 0);
+        let mut counts = [0; 3];
+        for effect in own {
+            let index = match effect.sides {
+                Sides::LINK => 0,
+                Sides::MOTOR => 1,
+                _ => 2,
+            };
+            counts[index] += 1;
+        }
+        counts
+    }
+
+    #[test]
+    fn backlash_alone_is_tried_with_mixed_sides_from_the_start() {
+        assert_eq!(arrangements("backlash", true), [6, 6, 6]);
+        assert_eq!(arrangements("backlash", false), [6, 2, 4]);
+        let [link, motor, mixed] = arrangements("joint_elasticity", true);
+        assert_eq!((link, mixed), (motor, 0));
     }
 }

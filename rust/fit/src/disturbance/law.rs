@@ -33,6 +33,10 @@ const HALVINGS: usize = 40;
 /// Number of rounds in which initial states and weights of the windows are recomputed around the model with an effect in the place of pushes.
 const LAW_ROUNDS: usize = 2;
 
+/// Ratio of the cost with an effect, fitted roughly, to the cost with the pushes, up to which the effect is fitted in full: of effects that then took
+/// the place of pushes none was above 1.02, of 12 others 11 were above 10.
+const MAX_ROUGH_COST_RATIO: f64 = 3.0;
+
 /// Ratio of duration, and of peak, of a contact's half-sine pulse of torque to the rectangular pulse of torque that fits it best.
 const HALF_SINE: f64 = 1.3;
 
@@ -155,6 +159,9 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             trial.guesses.par_iter().map(|guess| problem.solve(&model.with(*guess), Effort::ROUGH)).collect();
         let score = |fit: &Fit<P>| pushed.weighting.total(&fit.costs) + fit.prior_cost;
         let rough = fitted.into_iter().min_by(|a, b| score(a).total_cmp(&score(b)))?;
+        if score(&rough) > MAX_ROUGH_COST_RATIO * score(&pushed.fit) {
+            return None;
+        }
         let found = all.explanation(rough, &pushed.weighting, LAW_ROUNDS);
         let effect = *found.fit.hypothesis.effects.last()?;
         let acts = trial.theirs.iter().any(|e| {

@@ -84,6 +84,12 @@ impl EffectInstance {
         self.law.spec().parameters.iter().any(|p| p.quantity == Quantity::Cycles)
     }
 
+    /// Whether the effect is backlash: a transmission with a coupling ratio.
+    pub fn is_backlash(&self) -> bool {
+        self.law.has_transmission()
+            && self.law.spec().parameters.iter().any(|p| p.quantity == Quantity::Ratio)
+    }
+
     /// Joint that the effect acts on, counted from 1; `None` for effects of the whole arm.
     pub fn joint_number(&self) -> Option<usize> {
         (self.law.spec().scope == Scope::Joint).then_some(self.joint + 1)

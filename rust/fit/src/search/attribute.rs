@@ -11,7 +11,7 @@ use crate::model::hypothesis::{EffectInstance, Hypothesis};
 use crate::progress::Phase;
 use crate::search::acceptance::{ABOVE_FLOOR, UNEXPLAINED};
 use armgap_core::arm::Arm;
-use armgap_core::effect::{MAX_PARAMETERS, Quantity, Trial, catalogue, find};
+use armgap_core::effect::{MAX_PARAMETERS, Trial, catalogue, find};
 use armgap_core::transmission::Sides;
 use rayon::prelude::*;
 
@@ -351,11 +351,10 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let Some(index) = model.effects.iter().position(|e| e.same_place(&effect)) else {
             return Vec::new();
         };
-        let elastic = !effect.law.spec().parameters.iter().any(|p| p.quantity == Quantity::Ratio);
         let others: Vec<Sides> = self.sides[effect.joint]
             .iter()
             .copied()
-            .filter(|sides| *sides != effect.sides && (elastic || !sides.rotor_rides))
+            .filter(|sides| *sides != effect.sides && (!effect.is_backlash() || !sides.rotor_rides))
             .collect();
         let problem = self.problem(&weights.training);
         let with = |sides: Sides| {
