@@ -101,6 +101,15 @@ struct FittedZeros<const N: usize> {
     inputs: Option<LogInputs<N>>,
 }
 
+/// State of alternate fits and re-estimates of the residual scales.
+#[derive(Clone)]
+struct Rounds<const N: usize, const P: usize> {
+    hypothesis: Hypothesis<P>,
+    /// Scale of each joint's residual, rad or m.
+    scale: [f64; N],
+    zeros: EncoderZeros<N>,
+}
+
 /// A model whose fit and residual scales agree.
 struct Settled<const N: usize, const P: usize> {
     hypothesis: Hypothesis<P>,
@@ -355,11 +364,29 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     }
 
     /// Model, residual scales and weighting of the training windows after alternate fits and re-estimates of the scales, until both agree.
+    ///
+    /// Re-weighting has several fixed points: at large scales the windows that the model misses most weigh as much as the others and keep the scales
+    /// large. So it starts from `scale` and then from the noise, and the smaller scales hold (S-estimator; Rousseeuw and Yohai 1984).
     fn settled_weighting(&self, start: &Hypothesis<P>, scale: [f64; N], with_zeros: bool) -> Settled<N, P> {
-        self.progress.begin(Phase::Refit, MAX_ROUNDS + 1);
-        let mut scale = scale;
-        let mut hypothesis = start.clone();
-        let mut zeros = EncoderZeros::none();
+        self.progress.begin(Phase::Refit, 2 * MAX_ROUNDS + 1);
+        let first = Rounds { hypothesis: start.clone(), scale, zeros: EncoderZeros::none() };
+        let mut last = self.reweighted_until_settled(first, with_zeros);
+        if (0..N).any(|j| last.scale[j] > SETTLED_SCALE_RATIO * self.noise[j]) {
+            let from_noise = Rounds { scale: self.noise, ..last.clone() };
+            let smaller = self.reweighted_until_settled(from_noise, with_zeros);
+            let change: f64 = (0..N).map(|j| (smaller.scale[j] / last.scale[j]).ln()).sum();
+            if change < -SETTLED_SCALE_RATIO.ln() {
+                last = smaller;
+            }
+        }
+        let Rounds { hypothesis, scale, zeros } = last;
+        let weighting = self.training_weighting(&hypothesis, scale, &zeros, with_zeros);
+        Settled { hypothesis, scale, weighting }
+    }
+
+    /// Alternates fits to the training windows and re-estimates of the residual scales from `first` until both agree, at most `MAX_ROUNDS` times.
+    fn reweighted_until_settled(&self, first: Rounds<N, P>, with_zeros: bool) -> Rounds<N, P> {
+        let Rounds { mut hypothesis, mut scale, mut zeros } = first;
         loop_rounds(|round| {
             let weighting = self.training_weighting(&hypothesis, scale, &zeros, with_zeros);
             zeros.clone_from(&weighting.zeros);
@@ -370,8 +397,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             scale = next;
             change < SETTLED_SCALE_RATIO || round == MAX_ROUNDS
         });
-        let weighting = self.training_weighting(&hypothesis, scale, &zeros, with_zeros);
-        Settled { hypothesis, scale, weighting }
+        Rounds { hypothesis, scale, zeros }
     }
 
     /// Student-t cost of the training windows after parameters and encoder zeros of the recordings are estimated together, with the scales and the

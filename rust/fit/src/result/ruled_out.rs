@@ -8,7 +8,7 @@ use crate::result::report::{Bound, RuledOut, SeveralJoints, Status};
 use crate::search::acceptance::{ALMOST, MATTERS, restores};
 use crate::search::model_search::Attribution;
 use armgap_core::arm::Arm;
-use armgap_core::effect::{Scope, Spec, Trial, catalogue};
+use armgap_core::effect::{NEVER, Scope, Spec, Trial, catalogue};
 
 /// Standard deviation of an effect's size, relative to a typical size, above which the logs have not excited the effect.
 const PINNED: f64 = 0.5;
@@ -46,7 +46,7 @@ pub fn ruled_out<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         }
         match list.iter_mut().find(|(place, _)| place.same_place(&test.effect)) {
             // Of the tests of an effect at several initial guesses, the weakest statement holds for the effect.
-            Some((_, known)) if weaker(&entry, known) => *known = entry,
+            Some((place, known)) if prevails(&entry, known, is_whole(place)) => *known = entry,
             Some(_) => {}
             None => list.push((test.effect, entry)),
         }
@@ -94,10 +94,12 @@ fn never_fitted<const N: usize>(in_training: bool) -> Vec<RuledOut> {
     unsearched.flat_map(|spec| places(spec).into_iter().map(move |joint| entry(spec, joint))).collect()
 }
 
-/// Whether entry `a` states less than entry `b`: a less certain status, or a larger bound at the same status.
-fn weaker(a: &RuledOut, b: &RuledOut) -> bool {
+/// Whether entry `a`, and not entry `b`, holds for an effect: its status is less certain, or its bound at the same status larger, or smaller for an
+/// effect `by_trial`. Each trial excludes its own size, so together they exclude all sizes from the smallest on.
+fn prevails(a: &RuledOut, b: &RuledOut, by_trial: bool) -> bool {
     let size = |r: &RuledOut| r.bound.as_ref().map_or(f64::INFINITY, |b| b.value);
-    (a.status, size(a)) > (b.status, size(b))
+    let weaker = if by_trial { size(a) < size(b) } else { size(a) > size(b) };
+    a.status > b.status || a.status == b.status && weaker
 }
 
 /// Status and upper bound of the size of one candidate effect, from its score test.
@@ -112,7 +114,7 @@ fn status<A, const N: usize, const P: usize>(
     let sigma = test.sigma.max(test.information_sigma);
     let (effect, joint) = (spec.name, test.effect.joint_number());
     if spec.trial == Trial::Whole {
-        return threshold_status(test);
+        return trial_status(test, rotary);
     }
     let pinned = sigma < PINNED * typical;
     if !pinned {
@@ -174,7 +176,8 @@ fn leave_open(entry: &mut RuledOut, instead: &EffectInstance) {
 /// Makes an absent effect undecided if at its largest possible size it would explain a considerable share of the remaining gap, whose cost is
 /// `remains`.
 fn doubt(entry: &mut RuledOut, test: &ScoreTest, remains: f64) {
-    let most = entry.bound.as_ref().map_or(test.gain, |bound| (bound.value / test.information_sigma).powi(2));
+    let bound = entry.bound.as_ref().filter(|_| !is_whole(&test.effect));
+    let most = bound.map_or(test.gain, |bound| (bound.value / test.information_sigma).powi(2));
     let share = (most / remains).min(1.0);
     let law = test.effect.law;
     if entry.status == Status::Absent && law.spec().trial == Trial::Whole && !law.has_transmission() {
@@ -191,21 +194,39 @@ fn doubt(entry: &mut RuledOut, test: &ScoreTest, remains: f64) {
     }
 }
 
-/// Status of an effect that acts beyond a threshold: excited if any trial threshold was passed.
-fn threshold_status(test: &ScoreTest) -> RuledOut {
+/// Whether an effect is tested as a whole, at trial values, as one that acts beyond a threshold; estimates are then relative to the trial.
+fn is_whole(effect: &EffectInstance) -> bool {
+    effect.law.spec().trial == Trial::Whole
+}
+
+/// Status of an effect at trial values: excited if the trial leaves a trace, absent if a trace as large is excluded with 95 %. The trial size is then
+/// the bound, where the first parameter is a size and not a threshold.
+fn trial_status(test: &ScoreTest, rotary: bool) -> RuledOut {
     let spec = test.effect.law.spec();
     let (effect, joint) = (spec.name, test.effect.joint_number());
-    let reached = test.distinct > 0.0 && test.information_sigma < 0.5;
+    let sigma = test.sigma.max(test.information_sigma);
+    let reached = test.distinct > 0.0 && test.information_sigma < PINNED;
     let (status, why) = match () {
         () if !reached => {
             (Status::NotExcited, format!("these logs never reach it; it needs {}", spec.excited_by))
         }
         () if is_traced(test) => (Status::Undecided, TRACED.to_owned()),
+        () if test.estimate.abs() + NORMAL_95 * sigma > 1.0 => {
+            (Status::NotExcited, format!("these logs do not pin it down; it needs {}", spec.excited_by))
+        }
         () => {
             (Status::Absent, "at trial values it would leave a trace that these logs do not show".to_owned())
         }
     };
-    RuledOut { effect, joint, on: SeveralJoints::default(), status, bound: None, why: Some(why) }
+    let parameter = &spec.parameters[0];
+    let is_size = parameter.neutral < NEVER && parameter.lower >= 0.0;
+    let bound = (status == Status::Absent && is_size).then(|| Bound {
+        parameter: parameter.name,
+        value: (test.effect.p[0] - parameter.neutral).abs(),
+        unit: parameter.quantity.unit(rotary),
+        level: 0.95,
+    });
+    RuledOut { effect, joint, on: SeveralJoints::default(), status, bound, why: Some(why) }
 }
 
 /// Whether the score test of an effect on the training logs finds a size of more than three standard deviations.
@@ -218,29 +239,48 @@ mod tests {
     use super::*;
     use armgap_core::effect::find;
 
-    /// Score test of backlash with the estimated size `estimate` (1: that of the trial), standard deviation 0.1, or 2 where no trial size was
-    /// reached.
-    fn of_backlash(estimate: f64, reached: bool) -> RuledOut {
+    /// Status of backlash after a score test with a gap of 10 mrad: estimated size (1: that of the trial) and its standard deviation.
+    fn of_backlash(estimate: f64, sigma: f64) -> RuledOut {
         let effect = EffectInstance::new(find::<f64>("backlash").unwrap(), 0, [0.01, 0.0, 0.0]);
-        let information_sigma = if reached { 0.1 } else { 2.0 };
-        threshold_status(&ScoreTest {
+        let test = ScoreTest {
             effect,
             gain: 1.0,
             estimate,
             sigma: 0.1,
-            information_sigma,
+            information_sigma: sigma,
             imitation: Vec::new(),
             size: estimate,
             tested: 0,
             distinct: 0.5,
-        })
+        };
+        trial_status(&test, true)
     }
 
     #[test]
-    fn an_effect_with_a_threshold_is_absent_only_without_a_trace() {
-        assert_eq!(of_backlash(0.1, true).status, Status::Absent);
-        assert_eq!(of_backlash(0.9, true).status, Status::Undecided);
-        assert_eq!(of_backlash(0.9, true).why.as_deref(), Some(TRACED));
-        assert_eq!(of_backlash(0.9, false).status, Status::NotExcited);
+    fn an_effect_tested_as_a_whole_is_absent_only_from_the_trial_size_on() {
+        let absent = of_backlash(0.1, 0.1);
+        assert_eq!(absent.status, Status::Absent);
+        assert_eq!(absent.bound.map(|b| (b.parameter, b.value)), Some(("gap", 0.01)));
+        let traced = of_backlash(0.9, 0.1);
+        assert_eq!(
+            (traced.status, traced.why.as_deref(), traced.bound.is_none()),
+            (Status::Undecided, Some(TRACED), true)
+        );
+        assert_eq!(of_backlash(0.9, 2.0).status, Status::NotExcited);
+        // The scatter of the logs leaves room for all of the trial.
+        assert_eq!(of_backlash(0.4, 0.4).status, Status::NotExcited);
+    }
+
+    #[test]
+    fn of_several_trials_the_least_certain_status_and_then_the_smallest_size_holds() {
+        let [small, large] = [0.005, 0.02].map(|gap| {
+            let mut entry = of_backlash(0.1, 0.1);
+            entry.bound.iter_mut().for_each(|bound| bound.value = gap);
+            entry
+        });
+        let open = of_backlash(0.9, 2.0);
+        assert!(prevails(&small, &large, true) && !prevails(&large, &small, true));
+        assert!(prevails(&large, &small, false) && !prevails(&small, &large, false));
+        assert!(prevails(&open, &small, true) && !prevails(&small, &open, true));
     }
 }
