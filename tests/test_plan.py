@@ -418,6 +418,18 @@ def test_an_effect_that_is_listed_as_anothers_equivalent_is_asked_about_against_
     ]
 
 
+def test_an_effect_that_no_motion_separates_from_a_cause_has_the_equivalents_of_that_cause(limited):
+    cause = {"effect": "coulomb_asymmetry", "joint": 1, "parameters": {}, "title": "asymmetry"}
+    same = {"effect": "joint_spring", "joint": 1, "motion_separates": False}
+    other = {"effect": "base_tilt", "joint": None, "motion_separates": True}
+    data = {"causes": [{**cause, "equivalents": [same, other]}], "candidates": [], "ruled_out": []}
+    found = asked(["joint_spring:1"], data, limited)
+    assert [(q.place, q.rival) for q in found] == [
+        (("coulomb_asymmetry", 1), ("base_tilt", None)),
+        (("joint_spring", 1), ("none", None)),
+    ]
+
+
 def test_home_is_the_pose_nearest_to_zero(limited, diagnosis):
     assert limited.limits is not None
     away = replace(limited.limits, position_min=np.array([0.3, -2.0]))

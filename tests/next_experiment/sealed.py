@@ -17,15 +17,15 @@ from .cases import ARMS, Case, multisine, play, write_arm
 
 #: Duration of the large motion by which the sizes of effects are drawn, s.
 STATED_S = 10.0
-#: Range of the sizes of effects, on the trial's scale: 0 is barely visible in a large motion, 1 large; each unit below 0 is a factor of 4 to 10. With
-#: sizes up to 1 every large motion settled nearly every question.
+#: Range of the sizes of effects, on the trial's scale: 0 is barely visible in a large motion, 1 large; with sizes up to 1 every large motion settled
+#: nearly every question.
 SIZES = (-1.2, 0.0)
 
 
 def draw(seed: int, number: int) -> Case | None:
     """Draw a case: a random arm of one of the arm models with one effect; return None where no size of the effect can be drawn.
 
-    Sizes are drawn for a large motion, down to a tenth of what is barely visible there, so most effects are hardly visible in a small one.
+    Sizes are drawn for a large motion, most below what is barely visible there.
     """
     rng = np.random.default_rng([seed, number])
     model = sorted(ARMS)[int(rng.integers(len(ARMS)))]
@@ -41,5 +41,7 @@ def draw(seed: int, number: int) -> Case | None:
     try:
         drawn = REGISTRY[name].draw(Draw(rng, float(rng.uniform(*SIZES)), arm, index, usage([trace], index)))
     except NoTravelError:
+        return None
+    if not any(drawn.values()):  # a time below the simulator's step
         return None
     return replace(plain, parameters=drawn)

@@ -145,6 +145,8 @@ def _would_stand_for(entry: Data, cause: Data) -> bool:
 def asked(texts: Sequence[str], data: Data, arm: Arm) -> list[Question]:
     """Return the questions requested by the user, ``EFFECT:JOINT`` each: the effect against its absence, and against its equivalents.
 
+    An effect that no motion separates from a named cause has that cause's equivalents: what separates them from the cause separates them from it.
+
     Raises
     ------
     OptionError
@@ -154,7 +156,8 @@ def asked(texts: Sequence[str], data: Data, arm: Arm) -> list[Question]:
     for text in (texts,) if isinstance(texts, str) else texts:
         effect, joint = _parse(text, arm)
         pairs = [q for q in open_questions(data)[0] if q.against != NONE]
-        found += [q for q in pairs if q.place == (effect, joint)]
+        alike = {(effect, joint)}.union(*(pair for pair in inseparable(data) if (effect, joint) in pair))
+        found += [q for q in pairs if q.place in alike and q.rival not in alike]
         found += [
             Question(effect, joint, q.effect, q.joint, q.origin, why=q.why) for q in pairs if q.rival == (effect, joint)
         ]
