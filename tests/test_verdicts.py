@@ -8,6 +8,7 @@ import os
 import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -19,6 +20,7 @@ from armgap import Arm, Diagnosis, Log, _native, diagnose
 from armgap.diagnosis.diagnosis import _columns
 from armgap.evidence import plausibility
 from armgap.simulation import Effect
+from next_experiment.cases import Case, log_of, multisine, play, write_arm
 from swings import off, swing
 
 SEVERAL, CONSEQUENCE = 4.0, 1e-3
@@ -54,6 +56,21 @@ def test_held_positions_do_not_pass_for_noise(pendulum: Arm, rows: int) -> None:
     assert data["noise"]["position_sigma"][0] < 1.4 * 2e-4
     assert after > SEVERAL * floor
     assert not contradicts(data)
+
+
+@pytest.mark.parametrize("seed", [6, 12])
+def test_a_wrong_arm_file_beside_coarse_encoders_is_a_matter_of_parameters(tmp_path: Path, seed: int) -> None:
+    """The first prediction errs by a hundred times the noise, and some windows begin where a joint stops."""
+    case = Case("geared", "stribeck", 1, {"amplitude": 0.1, "velocity": 0.1})
+    arm, arm_file = write_arm(case, seed, tmp_path)
+    reference = multisine(arm_file, "geared", 10.0, seed)
+    found = diagnose(log_of(play(case, arm, reference, hidden=False), "log"), arm_file, max_causes=0)
+    assert found.verdict == "parameters"
+    assert max(a / f for a, f in zip(found.gap.after, found.gap.floor, strict=True)) < 1.5
+    names = [*(f"theta{i}" for i in range(1, 6)), "viscous1", "viscous2", "coulomb1", "coulomb2"]
+    for name, true in zip(names, arm.theta, strict=True):
+        found_value = found.parameters["refit"][name]
+        assert abs(found_value.value - true) < 4 * found_value.sigma, name
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])

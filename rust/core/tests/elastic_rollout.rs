@@ -4,7 +4,7 @@ use armgap_core::arm::{Pendulum, TwoLink};
 use armgap_core::cpu::Level;
 use armgap_core::effect::{Active, InputSegment, find};
 use armgap_core::integrate::{Interval, State, StepLimits, advance, advance_in_stable_steps};
-use armgap_core::plant::Plant;
+use armgap_core::plant::{Plant, StepRates};
 use armgap_core::rollout::{ElasticRollout, Run};
 use armgap_core::transmission::Sides;
 use nalgebra::{Vector1, Vector2};
@@ -244,4 +244,20 @@ fn friction_over_narrow_widths_is_stable_near_standstill() {
         }
         assert!(worst < 3e-6 && travel > 0.3, "{widths:?}: {worst:e} of {travel}");
     }
+}
+
+/// A joint that reverses late in an interval of many steps is located there: steps without an event do not count against the events of the interval.
+#[test]
+fn a_late_reversal_in_many_steps_is_located() {
+    let plant = elastic(0, Sides::LINK);
+    let torque = [(20.0, 20.0), (-8.0, -8.0)].map(|(start, end)| InputSegment { start, middle: start, end });
+    let interval = Interval { t: 0.0, h: 0.01, torque: &torque };
+    let begin = State::new(Vector2::new(0.3, -0.2), Vector2::new(0.5, 0.7));
+    let rates = StepRates { friction: 0.0, elsewhere: 1e5 };
+    let limits = StepLimits { near_standstill: 1, elsewhere: 100 };
+    let (mut divided, mut prescribed) = (begin, begin);
+    advance_in_stable_steps(&plant, &mut divided, &interval, &rates, limits);
+    advance(&plant, &mut prescribed, &interval, 100);
+    assert!(prescribed.dq[1] < 0.0, "the second joint has reversed: {}", prescribed.dq[1]);
+    assert!((divided.dq - prescribed.dq).amax() < 1e-9, "{:?} {:?}", divided.dq, prescribed.dq);
 }

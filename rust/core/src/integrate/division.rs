@@ -45,7 +45,7 @@ pub(crate) struct Division<T> {
     near_standstill: usize,
     /// Length of a step, s.
     pub(crate) h: T,
-    /// Number of events that the interval may still have: a joint that chatters, in every step as well, costs no more than one that chatters once.
+    /// Number of events that may still be located: a joint that chatters in every step costs no more than in an undivided interval.
     pub(crate) events: usize,
 }
 
@@ -65,9 +65,9 @@ impl<T: Real> Division<T> {
         Self { index: 0, count, near_standstill, h: h / lit(count as f64), events }
     }
 
-    /// Division of an interval of `h` seconds into `count` steps, with at most `events` events.
-    pub(crate) fn equal(h: T, count: usize, events: usize) -> Self {
-        Self { index: 0, count, near_standstill: count, h: h / lit(count as f64), events }
+    /// Division of an interval of `h` seconds into `count` steps.
+    pub(crate) fn equal(h: T, count: usize) -> Self {
+        Self { index: 0, count, near_standstill: count, h: h / lit(count as f64), events: 0 }
     }
 
     /// One step of zero length.
@@ -117,10 +117,10 @@ pub fn advance_in_stable_steps<T: Real, A: Arm<T, N, P>, const N: usize, const P
         return;
     }
     loop {
-        let start = *state;
+        let (start, events) = (*state, division.events);
         substep(plant, state, interval, &mut division);
         if division.needs_sliding() && !keep_sliding(plant, &start, state) {
-            *state = start;
+            (*state, division.events) = (start, events);
             division.refine();
         } else if !division.next() {
             return;

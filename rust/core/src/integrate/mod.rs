@@ -24,7 +24,7 @@ pub(crate) use division::{Division, keep_sliding};
 pub use division::{StepLimits, advance_in_stable_steps, largest_stable_rate};
 use nalgebra::SVector;
 
-/// Largest number of events located within one sample interval, or within one step where the number of steps is prescribed; after these events, steps
+/// Largest number of events located within one sample interval, or within each of its steps where their number is prescribed; after these events, steps
 /// are taken whole, and joints that change the sign of their velocity are stopped at their ends. 8 per joint, at least 16.
 pub(crate) const fn max_events(joints: usize) -> usize {
     if joints < 2 { 16 } else { 8 * joints }
@@ -97,8 +97,9 @@ pub fn advance<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize>(
     if count == 1 && plant.is_plain() && fixed_mode_step(plant, state, interval) {
         return;
     }
-    let mut division = Division::equal(interval.h, count, count * max_events(N));
+    let mut division = Division::equal(interval.h, count);
     loop {
+        division.events = max_events(N);
         substep(plant, state, interval, &mut division);
         if !division.next() {
             return;
@@ -251,7 +252,6 @@ impl<'a, T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'a, T
     fn exact(&self, state: &mut State<T, N>, from: T, dt: T, events: &mut usize) {
         let (mut x, mut left) = (from, dt);
         while *events > 0 {
-            *events -= 1;
             let k1 = self.settle(state, x);
             let trial = self.runge_kutta(state, x, left, &k1);
             let trial_step = TrialStep { state, x, dt: left, k1: &k1 };
@@ -259,6 +259,7 @@ impl<'a, T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'a, T
                 *state = trial;
                 return;
             };
+            *events -= 1;
             let Located { length, reached } = self.locate(&trial_step, &event);
             *state = self.applied(&event, reached);
             x += length;

@@ -172,10 +172,11 @@ impl<'r, 'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, c
     fn take_alone(&mut self, l: usize) {
         let Some(RunCursor { interval: Some(interval), .. }) = &self.cursors[l] else { return };
         let plant = self.lanes.plant();
-        let start = self.state_of(l);
+        let (start, events) = (self.state_of(l), self.divisions[l].events);
         let mut state = start;
         substep(plant, &mut state, interval, &mut self.divisions[l]);
         if self.divisions[l].needs_sliding() && !keep_sliding(plant, &start, &state) {
+            self.divisions[l].events = events;
             return self.refine(l);
         }
         self.set(l, &state);

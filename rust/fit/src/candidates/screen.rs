@@ -17,11 +17,12 @@ use rayon::prelude::*;
 /// Displacement of a candidate's tested parameter for derivatives by forward differences, relative to the parameter's initial guess.
 const TRIAL: f64 = 1e-3;
 
-/// One in this many initial guesses of a transmission is tried with encoder and friction on the motor's side where the model already has effects: the
+/// One in this many initial guesses of a transmission is tried with encoder or friction on the motor's side where the model already has effects: the
 /// latent states before a window take as long to simulate as the window itself.
 const MOTOR_GUESSES: usize = 3;
 
-/// One in this many initial guesses of backlash is tried with encoder and friction on different sides while the model has no effects.
+/// One in this many initial guesses of backlash is tried with its encoder at the motor and its friction at the link, beside other sides, while the model
+/// has no effects.
 const MIXED_GUESSES: usize = 2;
 
 /// Score test of a candidate at one initial guess.
@@ -82,15 +83,17 @@ pub fn effect_instances<const N: usize>(
                     all.push(effect);
                     continue;
                 }
-                for sides in tried(&sides[joint], effect.is_backlash()) {
-                    let one_in = match (all_guesses, sides.encoder_at_motor == sides.friction_at_motor) {
-                        _ if *sides == Sides::LINK => 1,
-                        (true, true) => 1,
-                        (true, false) => MIXED_GUESSES,
+                let tried = tried(&sides[joint], effect.is_backlash());
+                for sides in &tried {
+                    let mixed = sides.encoder_at_motor != sides.friction_at_motor && tried.len() > 1;
+                    let one_in = match (all_guesses, mixed) {
+                        _ if **sides == Sides::LINK => 1,
+                        (true, false) => 1,
+                        (true, true) => MIXED_GUESSES,
                         (false, _) => MOTOR_GUESSES,
                     };
                     if guess % one_in == one_in / 2 {
-                        all.push(effect.with_sides(*sides));
+                        all.push(effect.with_sides(**sides));
                     }
                 }
             }
@@ -99,11 +102,13 @@ pub fn effect_instances<const N: usize>(
     all
 }
 
-/// Sides of encoder and friction with which a transmission is tried, all with a geared rotor: both on one side, and for backlash also on different
-/// sides, as an elastic joint is recognised with wrong sides and backlash is not. All given sides if there are none of this kind.
+/// Sides of encoder and friction with which a transmission is tried, all with a geared rotor: both on one side, and for `backlash` also the encoder at the
+/// motor and the friction at the link, which no other sides come near. All given sides if there are none of this kind.
 fn tried(sides: &[Sides], backlash: bool) -> Vec<&Sides> {
-    let geared = |s: &&Sides| !s.rotor_rides && (backlash || s.encoder_at_motor == s.friction_at_motor);
-    let found: Vec<&Sides> = sides.iter().filter(geared).collect();
+    let known = |s: &&Sides| {
+        !s.rotor_rides && (s.encoder_at_motor == s.friction_at_motor || backlash && s.encoder_at_motor)
+    };
+    let found: Vec<&Sides> = sides.iter().filter(known).collect();
     if found.is_empty() { sides.iter().collect() } else { found }
 }
 
@@ -252,9 +257,9 @@ impl ScoreTest {
 mod tests {
     use super::*;
 
-    /// Arrangements of encoder and friction (both at the link, both at the motor, on different sides) with which an effect is tried on the first of
-    /// two joints, and how often.
-    fn arrangements(name: &str, all_guesses: bool) -> [usize; 3] {
+    /// How often an effect is tried on the first of two joints with encoder and friction both at the link, both at the motor, and on different sides, of
+    /// the arrangements that `sides` allows.
+    fn arrangements(name: &str, sides: &[Sides], all_guesses: bool) -> [usize; 3] {
         let scales = Scales {
             torque: [1.0; 2],
             speed: [1.0; 2],
@@ -265,33 +270,29 @@ mod tests {
             length: 0.3,
             gravity: 9.81,
         };
-        let sides = [true, false].into_iter().flat_map(|encoder_at_motor| {
-            [true, false].map(|friction_at_motor| Sides {
-                encoder_at_motor,
-                friction_at_motor,
-                ..Sides::LINK
-            })
-        });
-        let sides: Vec<Sides> = sides.collect();
-        let all = effect_instances(&scales, &[sides.clone(), sides], all_guesses);
-        let own = all.iter().filter(|e| e.law.spec().name == name && e.joint == 0);
-        let mut counts = [0; 3];
-        for effect in own {
-            let index = match effect.sides {
-                Sides::LINK => 0,
-                Sides::MOTOR => 1,
-                _ => 2,
-            };
-            counts[index] += 1;
-        }
-        counts
+        let all = effect_instances(&scales, &[sides.to_vec(), sides.to_vec()], all_guesses);
+        let own: Vec<Sides> =
+            all.iter().filter(|e| e.law.spec().name == name && e.joint == 0).map(|e| e.sides).collect();
+        let count = |wanted: Sides| own.iter().filter(|s| **s == wanted).count();
+        let [link, motor] = [Sides::LINK, Sides::MOTOR].map(count);
+        [link, motor, own.len() - link - motor]
     }
 
     #[test]
     fn backlash_alone_is_tried_with_mixed_sides_from_the_start() {
-        assert_eq!(arrangements("backlash", true), [6, 6, 6]);
-        assert_eq!(arrangements("backlash", false), [6, 2, 4]);
-        let [link, motor, mixed] = arrangements("joint_elasticity", true);
-        assert_eq!((link, mixed), (motor, 0));
+        let [mixed, other] = [true, false].map(|encoder_at_motor| Sides {
+            encoder_at_motor,
+            friction_at_motor: !encoder_at_motor,
+            ..Sides::LINK
+        });
+        let all = [Sides::LINK, Sides::MOTOR, mixed, other];
+        assert_eq!(arrangements("backlash", &all, true), [6, 6, 3]);
+        assert_eq!(arrangements("backlash", &all, false), [6, 2, 2]);
+        let [link, motor, none] = arrangements("joint_elasticity", &all, true);
+        assert_eq!((link, none), (motor, 0));
+        // Sides that the arm file states are tried with every guess.
+        assert_eq!(arrangements("backlash", &[mixed], true), [0, 0, 6]);
+        assert_eq!(arrangements("backlash", &[other], true), [0, 0, 6]);
+        assert_eq!(arrangements("joint_elasticity", &[other], true), [0, 0, link]);
     }
 }

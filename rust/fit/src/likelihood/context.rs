@@ -8,15 +8,9 @@ use crate::model::hypothesis::{EffectInstance, Hypothesis};
 use crate::numeric::products::rms;
 use crate::predict::log_inputs::LogInputs;
 use crate::predict::window::{Dataset, InitialStateOffset, Window};
-use crate::progress::{Phase, ProgressReporter};
+use crate::progress::ProgressReporter;
 use armgap_core::arm::Arm;
 use armgap_core::transmission::Sides;
-
-/// Largest number of rounds in which, alternately, a model is fitted and the weights of its residuals are computed.
-const MAX_ROUNDS: usize = 5;
-
-/// Ratio of successive residual scales of every joint below which re-weighting ends.
-const SETTLED_SCALE_RATIO: f64 = 1.1;
 
 /// Rounds of alternating estimation of encoder zeros and parameters, to find how much of the training cost encoder zeros explain.
 const ZERO_ROUNDS: usize = 2;
@@ -99,24 +93,6 @@ struct FittedZeros<const N: usize> {
     offsets: Vec<InitialStateOffset<N>>,
     /// Inputs of the logs under the hypothesis.
     inputs: Option<LogInputs<N>>,
-}
-
-/// State of alternate fits and re-estimates of the residual scales.
-#[derive(Clone)]
-struct Rounds<const N: usize, const P: usize> {
-    hypothesis: Hypothesis<P>,
-    /// Scale of each joint's residual, rad or m.
-    scale: [f64; N],
-    zeros: EncoderZeros<N>,
-}
-
-/// A model whose fit and residual scales agree.
-struct Settled<const N: usize, const P: usize> {
-    hypothesis: Hypothesis<P>,
-    /// Scale of each joint's residual, rad or m.
-    scale: [f64; N],
-    /// Weighting of the training windows with these scales.
-    weighting: Weighting<N>,
 }
 
 /// Predictions of a hypothesis linearised around given initial states.
@@ -215,7 +191,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     }
 
     /// Weighting of the training windows with initial states and, if `with_zeros`, encoder zeros (from `zeros`) fitted to the hypothesis.
-    fn training_weighting(
+    pub(super) fn training_weighting(
         &self,
         hypothesis: &Hypothesis<P>,
         scale: [f64; N],
@@ -303,103 +279,6 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         Linearised { weighting, residual, sensitivities, inputs }
     }
 
-    /// Fits the model and re-estimates the residual scales alternately, from the first scales `scale` per joint, rad or m, until both agree, with
-    /// encoder zeros that may differ between recordings.
-    pub fn settle(&self, start: &Hypothesis<P>, scale: [f64; N]) -> (Fit<P>, SplitWeighting<N>) {
-        self.settled(start, scale, EncoderZeros::can_be_told_from(&self.training.data))
-    }
-
-    /// Fits the model and re-estimates the residual scales, rad or m, alternately until both agree, with the same encoder zeros in all recordings.
-    pub(crate) fn settle_without_zeros(
-        &self,
-        start: &Hypothesis<P>,
-        scale: [f64; N],
-    ) -> (Fit<P>, SplitWeighting<N>) {
-        self.settled(start, scale, false)
-    }
-
-    /// Fits the arm without effects from the arm file's parameters and, where there are others to start from, from these too; returns the starting
-    /// point and the fit with the smaller prediction errors on the training logs, by the geometric mean over their windows: an unmodelled effect, such as a
-    /// drive that saturates, may make most of the RMS error in a few windows.
-    ///
-    /// The scale of the residual is estimated with the parameters, so the cost has several minima: where the arm file's parameters predict the logs
-    /// badly, the scale is large, the prior outweighs the residual, and the parameters hardly move.
-    pub(crate) fn settle_rigid(&self) -> (Hypothesis<P>, Fit<P>) {
-        let fitted = |theta: [f64; P]| {
-            let from = Hypothesis::rigid(theta);
-            let with_zeros = EncoderZeros::can_be_told_from(&self.training.data);
-            let settled = self.settled_weighting(&from, self.rough_scale(&from), with_zeros);
-            let fit = self.problem(&settled.weighting).solve(&settled.hypothesis, Effort::FULL);
-            let predicted = self.training.predict(&self.arm, &fit.hypothesis);
-            let of_window =
-                |w: &Window<N>| rms::<N>(&self.training.measured[w.range()], &predicted[w.range()]);
-            let errors = self.training.data.windows.iter().flat_map(of_window);
-            let missed: f64 =
-                errors.zip(self.noise.iter().cycle()).map(|(error, noise)| error.max(*noise).ln()).sum();
-            (from, fit, missed)
-        };
-        let start = self.start.filter(|start| *start != self.prior.theta);
-        let ((from, fit, missed), other) = rayon::join(|| fitted(self.prior.theta), || start.map(fitted));
-        match other {
-            Some((start, better, less)) if less < missed => (start, better),
-            _ => (from, fit),
-        }
-    }
-
-    fn settled(
-        &self,
-        start: &Hypothesis<P>,
-        scale: [f64; N],
-        with_zeros: bool,
-    ) -> (Fit<P>, SplitWeighting<N>) {
-        let Settled { hypothesis, scale, weighting: training } =
-            self.settled_weighting(start, scale, with_zeros);
-        let holdout = || {
-            let zeros = self.zeros_beside(&self.holdout, &hypothesis, scale, &training.zeros);
-            self.weighting(&self.holdout, &hypothesis, scale, &zeros)
-        };
-        let fit = || self.problem(&training).solve(&hypothesis, Effort::FULL);
-        let (holdout, fit) = rayon::join(holdout, fit);
-        (fit, SplitWeighting { training, holdout })
-    }
-
-    /// Model, residual scales and weighting of the training windows after alternate fits and re-estimates of the scales, until both agree.
-    ///
-    /// Re-weighting has several fixed points: at large scales the windows that the model misses most weigh as much as the others and keep the scales
-    /// large. So it starts from `scale` and then from the noise, and the smaller scales hold (S-estimator; Rousseeuw and Yohai 1984).
-    fn settled_weighting(&self, start: &Hypothesis<P>, scale: [f64; N], with_zeros: bool) -> Settled<N, P> {
-        self.progress.begin(Phase::Refit, 2 * MAX_ROUNDS + 1);
-        let first = Rounds { hypothesis: start.clone(), scale, zeros: EncoderZeros::none() };
-        let mut last = self.reweighted_until_settled(first, with_zeros);
-        if (0..N).any(|j| last.scale[j] > SETTLED_SCALE_RATIO * self.noise[j]) {
-            let from_noise = Rounds { scale: self.noise, ..last.clone() };
-            let smaller = self.reweighted_until_settled(from_noise, with_zeros);
-            let change: f64 = (0..N).map(|j| (smaller.scale[j] / last.scale[j]).ln()).sum();
-            if change < -SETTLED_SCALE_RATIO.ln() {
-                last = smaller;
-            }
-        }
-        let Rounds { hypothesis, scale, zeros } = last;
-        let weighting = self.training_weighting(&hypothesis, scale, &zeros, with_zeros);
-        Settled { hypothesis, scale, weighting }
-    }
-
-    /// Alternates fits to the training windows and re-estimates of the residual scales from `first` until both agree, at most `MAX_ROUNDS` times.
-    fn reweighted_until_settled(&self, first: Rounds<N, P>, with_zeros: bool) -> Rounds<N, P> {
-        let Rounds { mut hypothesis, mut scale, mut zeros } = first;
-        loop_rounds(|round| {
-            let weighting = self.training_weighting(&hypothesis, scale, &zeros, with_zeros);
-            zeros.clone_from(&weighting.zeros);
-            let fit = self.problem(&weighting).solve(&hypothesis, Effort::ROUGH);
-            let next = self.residual_scale(&weighting, &fit.hypothesis);
-            hypothesis = fit.hypothesis.clone();
-            let change = (0..N).map(|j| (next[j] / scale[j]).max(scale[j] / next[j])).fold(1.0, f64::max);
-            scale = next;
-            change < SETTLED_SCALE_RATIO || round == MAX_ROUNDS
-        });
-        Rounds { hypothesis, scale, zeros }
-    }
-
     /// Student-t cost of the training windows after parameters and encoder zeros of the recordings are estimated together, with the scales and the
     /// median window cost of `weighting`, which contains no encoder zeros.
     pub(crate) fn cost_with_zeros(&self, fit: &Fit<P>, weighting: &Weighting<N>) -> f64 {
@@ -445,14 +324,6 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             });
             crate::log::track::median(window_rms.collect()).max(self.noise[j])
         })
-    }
-}
-
-/// Calls `round(1)`, `round(2)`, … until a call returns true.
-fn loop_rounds(mut round: impl FnMut(usize) -> bool) {
-    let mut count = 1;
-    while !round(count) {
-        count += 1;
     }
 }
 

@@ -1,11 +1,12 @@
 //! Likelihood of the windows under a hypothesis, and the hypothesis's values of largest likelihood.
 //!
-//! * `context`: arm, prior, scales, training and holdout windows; re-weighting until the scales are those of the residual.
+//! * `context`: arm, prior, scales, training and holdout windows, and their weighting.
 //! * `covariance`: covariance of fitted values by the jackknife over windows.
 //! * `dispersion`: dispersion factor between fits to different motions.
 //! * `holdout`: cost of a fit on the holdout, compared with the cost of noise alone and of predicting no motion.
 //! * `jacobian`: Jacobian of the predictions, with columns reused between neighbouring points.
 //! * `scale`: typical sizes of quantities on an arm and its logs.
+//! * `settle`: re-weighting until the scales are those of the residual.
 //! * `solve`: damped Gauss-Newton over the arm's parameters and effects together.
 //! * `weighting`: weights of residuals: initial states projected out, robust weights of windows.
 
@@ -16,5 +17,6 @@ pub mod encoder_zero;
 pub mod holdout;
 pub(crate) mod jacobian;
 pub mod scale;
+pub(crate) mod settle;
 pub mod solve;
 pub mod weighting;

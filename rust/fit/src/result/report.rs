@@ -337,7 +337,7 @@ pub struct RuledOut {
     pub why: Option<String>,
 }
 
-/// Upper confidence bound of the size of an effect that was not found.
+/// Upper confidence bound of the size of an effect that was not found; for backlash the smallest of the sizes tried from which on all are excluded.
 #[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct Bound {
     /// Name of the bounded parameter of the effect.

@@ -8,9 +8,10 @@ use crate::result::report::{Bound, RuledOut, SeveralJoints, Status};
 use crate::search::acceptance::{ALMOST, MATTERS, restores};
 use crate::search::model_search::Attribution;
 use armgap_core::arm::Arm;
-use armgap_core::effect::{NEVER, Scope, Spec, Trial, catalogue};
+use armgap_core::effect::{Quantity, Scope, Spec, Trial, catalogue};
+use armgap_core::transmission::Sides;
 
-/// Standard deviation of an effect's size, relative to a typical size, above which the logs have not excited the effect.
+/// Standard deviation of an effect's size, relative to a typical size or to that of its trial, above which the logs have not excited the effect.
 const PINNED: f64 = 0.5;
 
 /// Share of the remaining gap above which an effect that could explain as much is not called absent.
@@ -38,19 +39,31 @@ pub fn ruled_out<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     let scored = known.map_or_else(tested, <[ScoreTest]>::to_vec);
     let remains = problem.weighting.total(&problem.raw_costs(model));
     let unexplained = node.is_open() || in_training;
-    let mut list: Vec<(EffectInstance, RuledOut)> = Vec::new();
+    let mut places: Vec<EffectInstance> = Vec::new();
     for test in &scored {
-        let mut entry = status(context, test, rotary);
-        if unexplained {
-            doubt(&mut entry, test, remains);
-        }
-        match list.iter_mut().find(|(place, _)| place.same_place(&test.effect)) {
-            // Of the tests of an effect at several initial guesses, the weakest statement holds for the effect.
-            Some((place, known)) if prevails(&entry, known, is_whole(place)) => *known = entry,
-            Some(_) => {}
-            None => list.push((test.effect, entry)),
+        if !places.iter().any(|place| place.same_place(&test.effect)) {
+            places.push(test.effect);
         }
     }
+    let of_place = |place: EffectInstance| {
+        let tests: Vec<&ScoreTest> = scored.iter().filter(|t| t.effect.same_place(&place)).collect();
+        let doubted = unexplained.then_some(remains);
+        let entry = if is_whole(&place) {
+            of_trials(&tests, doubted, rotary)
+        } else {
+            // Of the tests of an effect at several initial guesses, the weakest statement holds for the effect.
+            let entries = tests.iter().map(|test| {
+                let mut entry = status(context, test, rotary);
+                if let Some(remains) = doubted {
+                    doubt(&mut entry, test, remains);
+                }
+                entry
+            });
+            entries.reduce(|known, entry| if weaker(&entry, &known) { entry } else { known })?
+        };
+        Some((place, entry))
+    };
+    let mut list: Vec<(EffectInstance, RuledOut)> = places.into_iter().filter_map(of_place).collect();
     for (place, entry) in &mut list {
         if let Some(instead) = rivalled(attribution, place) {
             leave_open(entry, &instead);
@@ -94,12 +107,10 @@ fn never_fitted<const N: usize>(in_training: bool) -> Vec<RuledOut> {
     unsearched.flat_map(|spec| places(spec).into_iter().map(move |joint| entry(spec, joint))).collect()
 }
 
-/// Whether entry `a`, and not entry `b`, holds for an effect: its status is less certain, or its bound at the same status larger, or smaller for an
-/// effect `by_trial`. Each trial excludes its own size, so together they exclude all sizes from the smallest on.
-fn prevails(a: &RuledOut, b: &RuledOut, by_trial: bool) -> bool {
+/// Whether entry `a` states less than entry `b`: a less certain status, or a larger bound at the same status.
+fn weaker(a: &RuledOut, b: &RuledOut) -> bool {
     let size = |r: &RuledOut| r.bound.as_ref().map_or(f64::INFINITY, |b| b.value);
-    let weaker = if by_trial { size(a) < size(b) } else { size(a) > size(b) };
-    a.status > b.status || a.status == b.status && weaker
+    (a.status, size(a)) > (b.status, size(b))
 }
 
 /// Status and upper bound of the size of one candidate effect, from its score test.
@@ -113,9 +124,6 @@ fn status<A, const N: usize, const P: usize>(
     let typical = context.scales.size(parameter.quantity, test.effect.joint);
     let sigma = test.sigma.max(test.information_sigma);
     let (effect, joint) = (spec.name, test.effect.joint_number());
-    if spec.trial == Trial::Whole {
-        return trial_status(test, rotary);
-    }
     let pinned = sigma < PINNED * typical;
     if !pinned {
         let why = format!("these logs do not pin it down; it needs {}", spec.excited_by);
@@ -176,18 +184,9 @@ fn leave_open(entry: &mut RuledOut, instead: &EffectInstance) {
 /// Makes an absent effect undecided if at its largest possible size it would explain a considerable share of the remaining gap, whose cost is
 /// `remains`.
 fn doubt(entry: &mut RuledOut, test: &ScoreTest, remains: f64) {
-    let bound = entry.bound.as_ref().filter(|_| !is_whole(&test.effect));
-    let most = bound.map_or(test.gain, |bound| (bound.value / test.information_sigma).powi(2));
+    let most = entry.bound.as_ref().map_or(test.gain, |bound| (bound.value / test.information_sigma).powi(2));
     let share = (most / remains).min(1.0);
-    let law = test.effect.law;
-    if entry.status == Status::Absent && law.spec().trial == Trial::Whole && !law.has_transmission() {
-        // An effect with a threshold: the trial thresholds lie within the motion of the training logs, and the gap may arise beyond, where only the
-        // holdout went.
-        entry.status = Status::Undecided;
-        entry.why = Some(
-            "a gap remains, and it may begin beyond where the training logs went; let them reach what the holdout reaches".to_owned(),
-        );
-    } else if entry.status == Status::Absent && share > COULD_BE {
+    if entry.status == Status::Absent && share > COULD_BE {
         entry.status = Status::Undecided;
         let percent = 100.0 * share;
         entry.why = Some(format!("a gap remains, and up to {percent:.0} % of it could be its doing"));
@@ -199,34 +198,92 @@ fn is_whole(effect: &EffectInstance) -> bool {
     effect.law.spec().trial == Trial::Whole
 }
 
-/// Status of an effect at trial values: excited if the trial leaves a trace, absent if a trace as large is excluded with 95 %. The trial size is then
-/// the bound, where the first parameter is a size and not a threshold.
-fn trial_status(test: &ScoreTest, rotary: bool) -> RuledOut {
-    let spec = test.effect.law.spec();
-    let (effect, joint) = (spec.name, test.effect.joint_number());
-    let sigma = test.sigma.max(test.information_sigma);
-    let reached = test.distinct > 0.0 && test.information_sigma < PINNED;
-    let (status, why) = match () {
-        () if !reached => {
+/// Status of an effect that is tested as a whole, from its tests at several trial values; `doubted` is the cost of a gap that remains.
+///
+/// Excited if trials leave traces; undecided if a trial finds a trace, or cannot exclude one as large as it would leave; else absent. Of backlash, which
+/// alone has a size, trials may be too small: it is absent from the size on from which all trials exclude it, for all sides of encoder and friction.
+/// Of joint elasticity they may be too soft, and the reason states the stiffness up to which it is absent.
+fn of_trials(tests: &[&ScoreTest], doubted: Option<f64>, rotary: bool) -> RuledOut {
+    let effect = &tests[0].effect;
+    let spec = effect.law.spec();
+    let statuses: Vec<Status> = tests.iter().map(|test| trial_status(test)).collect();
+    let excluded = if effect.is_backlash() {
+        smallest_excluded(tests, &statuses)
+    } else {
+        statuses.iter().all(|s| *s == Status::Absent).then_some(f64::INFINITY)
+    };
+    let parameter = &spec.parameters[0];
+    let unit = parameter.quantity.unit(rotary);
+    let is_stiffness = parameter.quantity == Quantity::ShaftStiffness;
+    let stiffest = tests.iter().filter(|_| is_stiffness).map(|test| test.effect.p[0]).reduce(f64::max);
+    let stiffest = stiffest.unwrap_or(f64::INFINITY);
+    let gain = tests.iter().map(|test| test.gain).fold(0.0, f64::max);
+    let share = doubted.map_or(0.0, |remains| (gain / remains).min(1.0));
+    let (status, why) = match excluded {
+        _ if tests.iter().any(|test| is_traced(test)) => (Status::Undecided, TRACED.to_owned()),
+        None if statuses.contains(&Status::NotExcited) => {
             (Status::NotExcited, format!("these logs never reach it; it needs {}", spec.excited_by))
         }
-        () if is_traced(test) => (Status::Undecided, TRACED.to_owned()),
-        () if test.estimate.abs() + NORMAL_95 * sigma > 1.0 => {
-            (Status::NotExcited, format!("these logs do not pin it down; it needs {}", spec.excited_by))
-        }
-        () => {
+        None => (Status::Undecided, "at trial values its trace could be lost in the scatter of these logs".to_owned()),
+        // The trial thresholds lie within the motion of the training logs, and the gap may arise beyond, where only the holdout went.
+        Some(_) if doubted.is_some() && !effect.law.has_transmission() => (
+            Status::Undecided,
+            "a gap remains, and it may begin beyond where the training logs went; let them reach what the holdout reaches"
+                .to_owned(),
+        ),
+        Some(_) if share > COULD_BE => (
+            Status::Undecided,
+            format!("a gap remains, and up to {:.0} % of it could be its doing", 100.0 * share),
+        ),
+        Some(_) if stiffest.is_finite() => (
+            Status::Absent,
+            format!("a shaft of up to {stiffest:.3e} {unit} would leave a trace that these logs do not show"),
+        ),
+        Some(_) => {
             (Status::Absent, "at trial values it would leave a trace that these logs do not show".to_owned())
         }
     };
-    let parameter = &spec.parameters[0];
-    let is_size = parameter.neutral < NEVER && parameter.lower >= 0.0;
-    let bound = (status == Status::Absent && is_size).then(|| Bound {
+    let bound = excluded.filter(|size| status == Status::Absent && size.is_finite()).map(|value| Bound {
         parameter: parameter.name,
-        value: (test.effect.p[0] - parameter.neutral).abs(),
-        unit: parameter.quantity.unit(rotary),
+        value,
+        unit,
         level: 0.95,
     });
-    RuledOut { effect, joint, on: SeveralJoints::default(), status, bound, why: Some(why) }
+    let joint = effect.joint_number();
+    RuledOut { effect: spec.name, joint, on: SeveralJoints::default(), status, bound, why: Some(why) }
+}
+
+/// Size of backlash from which on every trial is absent, the largest over the sides of encoder and friction that were tried; none if with some sides
+/// the largest trial is not.
+fn smallest_excluded(tests: &[&ScoreTest], statuses: &[Status]) -> Option<f64> {
+    let mut sides: Vec<Sides> = Vec::new();
+    for test in tests {
+        if !sides.contains(&test.effect.sides) {
+            sides.push(test.effect.sides);
+        }
+    }
+    let with = |sides: Sides| {
+        let mut trials: Vec<(f64, Status)> = tests
+            .iter()
+            .zip(statuses)
+            .filter(|(test, _)| test.effect.sides == sides)
+            .map(|(test, status)| (test.effect.p[0], *status))
+            .collect();
+        trials.sort_by(|a, b| b.0.total_cmp(&a.0));
+        trials.iter().take_while(|(_, status)| *status == Status::Absent).last().map(|(size, _)| *size)
+    };
+    sides.into_iter().map(with).try_fold(0.0, |most, size| Some(f64::max(most, size?)))
+}
+
+/// What one trial of an effect as a whole says: the trial leaves no trace, or a trace as large is excluded with 95 %, or it is not.
+fn trial_status(test: &ScoreTest) -> Status {
+    let sigma = test.sigma.max(test.information_sigma);
+    let reached = test.distinct > 0.0 && test.information_sigma < PINNED;
+    match () {
+        () if !reached => Status::NotExcited,
+        () if is_traced(test) || test.estimate.abs() + NORMAL_95 * sigma > 1.0 => Status::Undecided,
+        () => Status::Absent,
+    }
 }
 
 /// Whether the score test of an effect on the training logs finds a size of more than three standard deviations.
@@ -239,11 +296,10 @@ mod tests {
     use super::*;
     use armgap_core::effect::find;
 
-    /// Status of backlash after a score test with a gap of 10 mrad: estimated size (1: that of the trial) and its standard deviation.
-    fn of_backlash(estimate: f64, sigma: f64) -> RuledOut {
-        let effect = EffectInstance::new(find::<f64>("backlash").unwrap(), 0, [0.01, 0.0, 0.0]);
-        let test = ScoreTest {
-            effect,
+    /// Score test of backlash with the gap `size`, rad: estimated share of the trial and its standard deviation.
+    fn backlash(size: f64, estimate: f64, sigma: f64) -> ScoreTest {
+        ScoreTest {
+            effect: EffectInstance::new(find::<f64>("backlash").unwrap(), 0, [size, 0.0, 0.0]),
             gain: 1.0,
             estimate,
             sigma: 0.1,
@@ -252,35 +308,35 @@ mod tests {
             size: estimate,
             tested: 0,
             distinct: 0.5,
-        };
-        trial_status(&test, true)
+        }
+    }
+
+    fn found(tests: &[ScoreTest], doubted: Option<f64>) -> (Status, Option<f64>) {
+        let entry = of_trials(&tests.iter().collect::<Vec<_>>(), doubted, true);
+        (entry.status, entry.bound.map(|b| b.value))
     }
 
     #[test]
-    fn an_effect_tested_as_a_whole_is_absent_only_from_the_trial_size_on() {
-        let absent = of_backlash(0.1, 0.1);
-        assert_eq!(absent.status, Status::Absent);
-        assert_eq!(absent.bound.map(|b| (b.parameter, b.value)), Some(("gap", 0.01)));
-        let traced = of_backlash(0.9, 0.1);
-        assert_eq!(
-            (traced.status, traced.why.as_deref(), traced.bound.is_none()),
-            (Status::Undecided, Some(TRACED), true)
-        );
-        assert_eq!(of_backlash(0.9, 2.0).status, Status::NotExcited);
-        // The scatter of the logs leaves room for all of the trial.
-        assert_eq!(of_backlash(0.4, 0.4).status, Status::NotExcited);
+    fn backlash_is_absent_from_the_size_on_that_all_larger_trials_exclude() {
+        let [small, large] = [0.005, 0.02].map(|size| backlash(size, 0.1, 0.1));
+        let unseen = backlash(0.0025, 0.0, 2.0);
+        let hidden = backlash(0.005, 0.4, 0.4);
+        assert_eq!(found(&[small.clone(), large.clone()], None), (Status::Absent, Some(0.005)));
+        assert_eq!(found(&[unseen.clone(), small, large.clone()], None), (Status::Absent, Some(0.005)));
+        assert_eq!(found(&[hidden.clone(), large.clone()], None), (Status::Absent, Some(0.02)));
+        assert_eq!(found(&[hidden], None), (Status::Undecided, None));
+        assert_eq!(found(&[unseen], None), (Status::NotExcited, None));
+        // With other sides of encoder and friction only larger gaps are excluded.
+        let mut other = backlash(0.08, 0.1, 0.1);
+        other.effect.sides = Sides::MOTOR;
+        assert_eq!(found(&[large, other], None), (Status::Absent, Some(0.08)));
     }
 
     #[test]
-    fn of_several_trials_the_least_certain_status_and_then_the_smallest_size_holds() {
-        let [small, large] = [0.005, 0.02].map(|gap| {
-            let mut entry = of_backlash(0.1, 0.1);
-            entry.bound.iter_mut().for_each(|bound| bound.value = gap);
-            entry
-        });
-        let open = of_backlash(0.9, 2.0);
-        assert!(prevails(&small, &large, true) && !prevails(&large, &small, true));
-        assert!(prevails(&large, &small, false) && !prevails(&small, &large, false));
-        assert!(prevails(&open, &small, true) && !prevails(&small, &open, true));
+    fn a_trace_or_a_gap_that_remains_leaves_backlash_undecided() {
+        let [seen, absent] = [0.9, 0.1].map(|estimate| backlash(0.01, estimate, 0.1));
+        assert_eq!(found(&[absent.clone(), seen], None), (Status::Undecided, None));
+        assert_eq!(found(std::slice::from_ref(&absent), Some(2.0)), (Status::Undecided, None));
+        assert_eq!(found(&[absent], Some(200.0)), (Status::Absent, Some(0.01)));
     }
 }
