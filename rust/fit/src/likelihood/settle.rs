@@ -30,6 +30,13 @@ struct Rounds<const N: usize, const P: usize> {
     zeros: EncoderZeros<N>,
 }
 
+impl<const N: usize, const P: usize> Rounds<N, P> {
+    /// First round from a model and scales, without encoder zeros.
+    fn new(start: &Hypothesis<P>, scale: [f64; N]) -> Self {
+        Self { hypothesis: start.clone(), scale, zeros: EncoderZeros::none() }
+    }
+}
+
 /// A model whose fit and residual scales agree.
 struct Settled<const N: usize, const P: usize> {
     hypothesis: Hypothesis<P>,
@@ -65,7 +72,9 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let fitted = |theta: [f64; P]| {
             let from = Hypothesis::rigid(theta);
             let with_zeros = EncoderZeros::can_be_told_from(&self.training.data);
-            let settled = self.settled_weighting(&from, self.rough_scale(&from), with_zeros);
+            // Fits are compared below, and by checks of the input: with scales from the noise, a wrong unit of noisy torques was not found.
+            let first = Rounds::new(&from, self.rough_scale(&from));
+            let settled = self.weighted(self.reweighted_until_settled(first, with_zeros).0, with_zeros);
             let fit = self.problem(&settled.weighting).solve(&settled.hypothesis, Effort::FULL);
             let missed = self.missed(&fit.hypothesis, &EncoderZeros::none());
             (from, fit, missed)
@@ -101,9 +110,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     /// large. So it starts from `scale` and then from the noise, and the smaller scales hold, as in S-estimation (Rousseeuw and Yohai 1984), if the
     /// predictions from measured initial states do not miss much more: at the noise, errors of the model may pass for errors of initial states.
     fn settled_weighting(&self, start: &Hypothesis<P>, scale: [f64; N], with_zeros: bool) -> Settled<N, P> {
-        self.progress.begin(Phase::Refit, MAX_ROUNDS + 1);
-        let first = Rounds { hypothesis: start.clone(), scale, zeros: EncoderZeros::none() };
-        let (mut last, _) = self.reweighted_until_settled(first, with_zeros);
+        let (mut last, _) = self.reweighted_until_settled(Rounds::new(start, scale), with_zeros);
         if (0..N).any(|j| last.scale[j] > SETTLED_SCALE_RATIO * self.noise[j]) {
             let from_noise = Rounds { scale: self.noise, ..last.clone() };
             let (other, agrees) = self.reweighted_until_settled(from_noise, with_zeros);
@@ -113,6 +120,11 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
                 last = other;
             }
         }
+        self.weighted(last, with_zeros)
+    }
+
+    /// The model and scales of the last round with the weighting of the training windows around them.
+    fn weighted(&self, last: Rounds<N, P>, with_zeros: bool) -> Settled<N, P> {
         let Rounds { hypothesis, scale, zeros } = last;
         let weighting = self.training_weighting(&hypothesis, scale, &zeros, with_zeros);
         Settled { hypothesis, scale, weighting }
@@ -120,6 +132,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
 
     /// Alternate fits to the training windows and re-estimates of the scales from `first`, and whether both agree after at most `MAX_ROUNDS`.
     fn reweighted_until_settled(&self, first: Rounds<N, P>, with_zeros: bool) -> (Rounds<N, P>, bool) {
+        self.progress.begin(Phase::Refit, MAX_ROUNDS + 1);
         let (Rounds { mut hypothesis, mut scale, mut zeros }, mut agree) = (first, false);
         loop_rounds(|round| {
             let weighting = self.training_weighting(&hypothesis, scale, &zeros, with_zeros);
