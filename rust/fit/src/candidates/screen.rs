@@ -85,7 +85,9 @@ pub fn effect_instances<const N: usize>(
                 }
                 let tried = tried(&sides[joint], effect.is_backlash());
                 for sides in &tried {
-                    let mixed = sides.encoder_at_motor != sides.friction_at_motor && tried.len() > 1;
+                    let mixed = effect.is_backlash()
+                        && tried.len() > 1
+                        && sides.encoder_at_motor != sides.friction_at_motor;
                     let one_in = match (all_guesses, mixed) {
                         _ if **sides == Sides::LINK => 1,
                         (true, false) => 1,
