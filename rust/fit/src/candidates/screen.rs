@@ -296,7 +296,7 @@ mod tests {
         assert_eq!(arrangements("backlash", &[mixed], true), [0, 0, 6]);
         assert_eq!(arrangements("backlash", &[other], true), [0, 0, 6]);
         assert_eq!(arrangements("joint_elasticity", &[other], true), [0, 0, link]);
-        let riding = all.map(|sides| Sides { rotor_rides: true, ..sides });
-        assert_eq!(arrangements("joint_elasticity", &riding, true), [0, 0, 4 * link]);
+        let rotor_rides = all.map(|sides| Sides { rotor_rides: true, ..sides });
+        assert_eq!(arrangements("joint_elasticity", &rotor_rides, true), [0, 0, 4 * link]);
     }
 }
