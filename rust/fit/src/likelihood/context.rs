@@ -260,6 +260,16 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         FittedZeros { zeros, offsets, inputs }
     }
 
+    /// Weighting of the windows `sample` around their measured initial states, with all robust weights one.
+    pub(super) fn equal_weighting(
+        &self,
+        sample: &WindowSet<N>,
+        hypothesis: &Hypothesis<P>,
+        scale: [f64; N],
+    ) -> Weighting<N> {
+        self.linearised(sample, hypothesis, scale, sample.data.zero_offsets(), None).weighting
+    }
+
     /// Predictions linearised around initial states with the offsets `offsets`; `known` are the inputs of the logs under the hypothesis, if known.
     fn linearised(
         &self,

@@ -9,6 +9,7 @@ use crate::numeric::products::rms;
 use crate::predict::window::Window;
 use crate::progress::Phase;
 use armgap_core::arm::Arm;
+use rayon::prelude::*;
 
 /// Largest number of rounds in which, alternately, a model is fitted and the weights of its residuals are computed.
 const MAX_ROUNDS: usize = 5;
@@ -62,16 +63,17 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         self.settled(start, scale, false)
     }
 
-    /// Fits the arm without effects from the arm file's parameters and, where there are others to start from, from these too; returns the starting
-    /// point and the fit with the smaller prediction errors on the training logs, by the geometric mean over their windows: an unmodelled effect, such as a
-    /// drive that saturates, may make most of the RMS error in a few windows.
+    /// Fits the arm without effects from several starting points; returns the starting point and the fit with the smallest prediction errors on the
+    /// training logs, by the geometric mean over their windows: an unmodelled effect, such as a drive that saturates, may make most of the RMS error in
+    /// a few windows.
     ///
-    /// The scale of the residual is estimated with the parameters, so the cost has several minima: where the arm file's parameters predict the logs
-    /// badly, the scale is large, the prior outweighs the residual, and the parameters hardly move.
+    /// Scales and weights of the residual are estimated with the parameters, so the cost has several minima. Where the arm file's parameters predict
+    /// the logs badly, the scale is large, the prior outweighs the residual, and the parameters hardly move. Where they predict large motions badly and
+    /// small ones well, robust weights take the large motions for outliers. So fits start from the arm file's parameters, from those of least squares
+    /// without robust weights, and from others that are given.
     pub(crate) fn settle_rigid(&self) -> (Hypothesis<P>, Fit<P>) {
-        let fitted = |theta: [f64; P]| {
-            let from = Hypothesis::rigid(theta);
-            let with_zeros = EncoderZeros::can_be_told_from(&self.training.data);
+        let with_zeros = EncoderZeros::can_be_told_from(&self.training.data);
+        let fitted = |from: Hypothesis<P>| {
             // Fits are compared below, and by checks of the input: with scales from the noise, a wrong unit of noisy torques was not found.
             let first = Rounds::new(&from, self.rough_scale(&from));
             let settled = self.weighted(self.reweighted_until_settled(first, with_zeros).0, with_zeros);
@@ -79,12 +81,23 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             let missed = self.missed(&fit.hypothesis, &EncoderZeros::none());
             (from, fit, missed)
         };
-        let start = self.start.filter(|start| *start != self.prior.theta);
-        let ((from, fit, missed), other) = rayon::join(|| fitted(self.prior.theta), || start.map(fitted));
-        match other {
-            Some((start, better, less)) if less < missed => (start, better),
-            _ => (from, fit),
-        }
+        let nominal = Hypothesis::rigid(self.prior.theta);
+        let given = self.start.filter(|start| *start != self.prior.theta).map(Hypothesis::rigid);
+        let from_nominal = || fitted(nominal.clone());
+        let others = || {
+            let starts = [Some(self.least_squares(&nominal)), given];
+            starts.into_par_iter().flatten().map(fitted).collect::<Vec<_>>()
+        };
+        let (first, others) = rayon::join(from_nominal, others);
+        let (from, fit, _) =
+            others.into_iter().fold(first, |best, other| if other.2 < best.2 { other } else { best });
+        (from, fit)
+    }
+
+    /// Least-squares fit to the training windows, all with the same weight, from the model `start`.
+    fn least_squares(&self, start: &Hypothesis<P>) -> Hypothesis<P> {
+        let weighting = self.equal_weighting(&self.training, start, self.rough_scale(start));
+        self.problem(&weighting).solve(start, Effort::FULL).hypothesis
     }
 
     fn settled(
