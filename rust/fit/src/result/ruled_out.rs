@@ -215,8 +215,7 @@ fn of_trials(tests: &[&ScoreTest], doubted: Option<f64>, rotary: bool) -> RuledO
     let parameter = &spec.parameters[0];
     let unit = parameter.quantity.unit(rotary);
     let is_stiffness = parameter.quantity == Quantity::ShaftStiffness;
-    let stiffest = tests.iter().filter(|_| is_stiffness).map(|test| test.effect.p[0]).reduce(f64::max);
-    let stiffest = stiffest.unwrap_or(f64::INFINITY);
+    let stiffest = if is_stiffness { stiffest_excluded(tests) } else { f64::INFINITY };
     let gain = tests.iter().map(|test| test.gain).fold(0.0, f64::max);
     let share = doubted.map_or(0.0, |remains| (gain / remains).min(1.0));
     let (status, why) = match excluded {
@@ -275,6 +274,16 @@ fn smallest_excluded(tests: &[&ScoreTest], statuses: &[Status]) -> Option<f64> {
     sides.into_iter().map(with).try_fold(0.0, |most, size| Some(f64::max(most, size?)))
 }
 
+/// Stiffness up to which trials exclude a shaft with any rotor: the least, over the rotor inertias and sides that were tried, of the stiffest trial.
+fn stiffest_excluded(tests: &[&ScoreTest]) -> f64 {
+    let alike = |a: &EffectInstance, b: &EffectInstance| a.p[2] == b.p[2] && a.sides == b.sides;
+    let stiffest = |test: &&ScoreTest| {
+        let same = tests.iter().filter(|other| alike(&other.effect, &test.effect));
+        same.map(|other| other.effect.p[0]).fold(0.0, f64::max)
+    };
+    tests.iter().map(stiffest).fold(f64::INFINITY, f64::min)
+}
+
 /// What one trial of an effect as a whole says: the trial leaves no trace, or a trace as large is excluded with 95 %, or it is not.
 fn trial_status(test: &ScoreTest) -> Status {
     let sigma = test.sigma.max(test.information_sigma);
@@ -330,6 +339,18 @@ mod tests {
         let mut other = backlash(0.08, 0.1, 0.1);
         other.effect.sides = Sides::MOTOR;
         assert_eq!(found(&[large, other], None), (Status::Absent, Some(0.08)));
+    }
+
+    #[test]
+    fn a_shaft_is_absent_up_to_the_stiffness_that_trials_exclude_with_every_rotor() {
+        let shaft = |stiffness: f64, rotor: f64| ScoreTest {
+            effect: EffectInstance::new(find::<f64>("joint_elasticity").unwrap(), 0, [stiffness, 1.0, rotor]),
+            ..backlash(0.0, 0.1, 0.1)
+        };
+        let tests = [shaft(100.0, 0.01), shaft(400.0, 0.01), shaft(500.0, 0.1), shaft(6000.0, 0.1)];
+        let entry = of_trials(&tests.iter().collect::<Vec<_>>(), None, true);
+        assert_eq!(entry.status, Status::Absent);
+        assert!(entry.why.unwrap().contains("up to 4.000e2 N m/rad"));
     }
 
     #[test]
