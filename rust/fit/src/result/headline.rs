@@ -6,7 +6,7 @@
 use crate::disturbance::push::{Conclusion, Disturbance};
 use crate::likelihood::context::{DiagnosisContext, SplitWeighting};
 use crate::likelihood::solve::Fit;
-use crate::model::hypothesis::EffectInstance;
+use crate::model::hypothesis::{EffectInstance, Hypothesis};
 use crate::search::belief::Cause;
 use crate::search::model_search::{Attribution, refresh};
 use armgap_core::arm::Arm;
@@ -114,9 +114,20 @@ fn sorted<T>(
     (named, rest)
 }
 
-/// At most `most` causes to be named, and the rest with the reasons why they are not.
-fn sorted_causes(causes: &[Cause], most: usize) -> (Vec<Cause>, Vec<Unnamed<Cause>>) {
-    sorted(causes.to_vec(), most, most, |c| unfit(&c.effect, &c.sigma, c.probability))
+/// At most `most` causes to be named, and the rest with the reasons why they are not; `against` is a reason against all.
+fn sorted_causes(causes: &[Cause], most: usize, against: Option<&str>) -> (Vec<Cause>, Vec<Unnamed<Cause>>) {
+    let why_not =
+        |c: &Cause| against.map(str::to_owned).or_else(|| unfit(&c.effect, &c.sigma, c.probability));
+    sorted(causes.to_vec(), most, most, why_not)
+}
+
+/// Reason why no cause is named, from the RMS prediction errors on the holdout by joint under the arm file as it stands, `given`, and under the model
+/// that a search found, `found`, which leaves a gap: what has been learnt from the training logs does not hold beyond them.
+fn against_all(given: &[f64], found: &[f64]) -> Option<&'static str> {
+    let worse = given.iter().sum::<f64>() < found.iter().sum();
+    worse.then_some(
+        "with all that was found, held-out motion is predicted worse than by the arm file as it stands",
+    )
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
@@ -127,7 +138,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     pub fn headline(&mut self, conclusion: Conclusion<N, P>, most: usize) -> Headline<N, P> {
         let Conclusion { mut attribution, alone, mut disturbances } = conclusion;
         self.weigh(&mut attribution);
-        let (mut causes, mut candidates) = sorted_causes(&attribution.causes, most);
+        let against = self.against_all(&attribution);
+        let (mut causes, mut candidates) = sorted_causes(&attribution.causes, most, against);
         disturbances.sort_by(|a, b| b.clarity().total_cmp(&a.clarity()));
         let (disturbances, disturbance_candidates) =
             sorted(disturbances, most - causes.len(), most, |e| unfit(&e.push, &e.sigma, e.probability));
@@ -136,7 +148,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             attribution = alone;
             self.set_pushes(&[]);
             self.weigh(&mut attribution);
-            (causes, candidates) = sorted_causes(&attribution.causes, most);
+            let against = self.against_all(&attribution);
+            (causes, candidates) = sorted_causes(&attribution.causes, most, against);
             changed = false;
         }
         self.set_pushes(&disturbances);
@@ -153,6 +166,15 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             candidates,
             disturbance_candidates,
         }
+    }
+
+    /// Reason why none of the causes that a model search has found is named; none if it predicts the holdout better than the arm file does, or leaves no
+    /// gap.
+    fn against_all(&self, attribution: &Attribution<N, P>) -> Option<&'static str> {
+        let errors = |hypothesis: &Hypothesis<P>| self.holdout.errors(&self.arm, hypothesis);
+        let given = Hypothesis::rigid(self.prior.theta);
+        let judged = attribution.is_unexplained() && !attribution.causes.is_empty();
+        judged.then(|| against_all(&errors(&given), &errors(&attribution.model.hypothesis))).flatten()
     }
 
     /// Model with the named causes alone, its window weights, and whether its gap is open; `changed` says that some found cause or disturbance is not
@@ -189,6 +211,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::search::acceptance::Ground;
+    use crate::search::evidence::Evidence;
     use armgap_core::effect::find;
 
     fn effect(name: &str, p: [f64; 3]) -> EffectInstance {
@@ -221,6 +245,24 @@ mod tests {
             let why = unfit(&effect(name, p), &sigma, probability);
             assert_eq!(why.is_none(), fit, "{name} {p:?} {sigma:?} {probability}: {why:?}");
         }
+    }
+
+    #[test]
+    fn no_cause_is_named_with_which_motion_is_predicted_worse_than_by_the_arm_file() {
+        let cause = Cause {
+            effect: effect("stribeck", [0.8, 0.3, 0.0]),
+            sigma: vec![0.03, 0.02],
+            probability: 0.99,
+            share: 0.9,
+            relevance: 0.1,
+            look_alikes: Vec::new(),
+            evidence: Evidence::default(),
+            ground: Ground::Motion,
+        };
+        let (named, rest) = sorted_causes(&[cause.clone()], 3, against_all(&[2.0, 1.0], &[0.5, 2.0]));
+        assert_eq!((named.len(), rest.len()), (1, 0));
+        let (named, rest) = sorted_causes(&[cause], 3, against_all(&[1.0, 2.0], &[0.5, 9.0]));
+        assert!(named.is_empty() && rest[0].why.contains("worse than by the arm file"));
     }
 
     #[test]
