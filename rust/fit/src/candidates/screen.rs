@@ -21,8 +21,8 @@ const TRIAL: f64 = 1e-3;
 /// latent states before a window take as long to simulate as the window itself.
 const MOTOR_GUESSES: usize = 3;
 
-/// One in this many initial guesses of backlash is tried with its encoder at the motor and its friction at the link, beside other sides, while the model
-/// has no effects.
+/// One in this many initial guesses of backlash is tried with its encoder on one side and its friction on the other, beside other sides, while the
+/// model has no effects.
 const MIXED_GUESSES: usize = 2;
 
 /// Score test of a candidate at one initial guess.
@@ -104,12 +104,10 @@ pub fn effect_instances<const N: usize>(
     all
 }
 
-/// Sides of encoder and friction with which a transmission is tried, all with a geared rotor: both on one side, and for `backlash` also the encoder at the
-/// motor and the friction at the link, which no other sides come near. All given sides if there are none of this kind.
+/// Sides of encoder and friction with which a transmission is tried, all with a geared rotor: both on one side, and for `backlash` also on different sides,
+/// which fits with both on one side may not come near. All given sides if there are none of this kind.
 fn tried(sides: &[Sides], backlash: bool) -> Vec<&Sides> {
-    let known = |s: &&Sides| {
-        !s.rotor_rides && (s.encoder_at_motor == s.friction_at_motor || backlash && s.encoder_at_motor)
-    };
+    let known = |s: &&Sides| !s.rotor_rides && (s.encoder_at_motor == s.friction_at_motor || backlash);
     let found: Vec<&Sides> = sides.iter().filter(known).collect();
     if found.is_empty() { sides.iter().collect() } else { found }
 }
@@ -288,8 +286,8 @@ mod tests {
             ..Sides::LINK
         });
         let all = [Sides::LINK, Sides::MOTOR, mixed, other];
-        assert_eq!(arrangements("backlash", &all, true), [6, 6, 3]);
-        assert_eq!(arrangements("backlash", &all, false), [6, 2, 2]);
+        assert_eq!(arrangements("backlash", &all, true), [6, 6, 6]);
+        assert_eq!(arrangements("backlash", &all, false), [6, 2, 4]);
         let [link, motor, none] = arrangements("joint_elasticity", &all, true);
         assert_eq!((link, none), (motor, 0));
         // Sides that the arm file states are tried with every guess.
