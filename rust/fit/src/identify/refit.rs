@@ -59,7 +59,8 @@ impl WithArm for RigidFit<'_> {
     ) -> Self::Output {
         let Self(request) = self;
         let context = request.context::<A, N, P>(arm, theta, request.training, request.holdout)?;
-        let (_, fit) = context.settle_rigid();
+        // Not from least squares: they fit torques of a wrong unit that are mostly noise.
+        let (_, fit) = context.settle_rigid(false);
         let missed = |hypothesis: &Hypothesis<P>| context.holdout.errors(&context.arm, hypothesis);
         Ok(Refit {
             theta: fit.hypothesis.theta.to_vec(),

@@ -69,9 +69,9 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     ///
     /// Scales and weights of the residual are estimated with the parameters, so the cost has several minima. Where the arm file's parameters predict
     /// the logs badly, the scale is large, the prior outweighs the residual, and the parameters hardly move. Where they predict large motions badly and
-    /// small ones well, robust weights take the large motions for outliers. So fits start from the arm file's parameters, from those of least squares
-    /// without robust weights, and from others that are given.
-    pub(crate) fn settle_rigid(&self) -> (Hypothesis<P>, Fit<P>) {
+    /// small ones well, robust weights take the large motions for outliers. So fits start from the arm file's parameters, from others that are given,
+    /// and with `from_least_squares` from those of a fit without robust weights.
+    pub(crate) fn settle_rigid(&self, from_least_squares: bool) -> (Hypothesis<P>, Fit<P>) {
         let with_zeros = EncoderZeros::can_be_told_from(&self.training.data);
         let fitted = |from: Hypothesis<P>| {
             // Fits are compared below, and by checks of the input: with scales from the noise, a wrong unit of noisy torques was not found.
@@ -85,7 +85,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let given = self.start.filter(|start| *start != self.prior.theta).map(Hypothesis::rigid);
         let from_nominal = || fitted(nominal.clone());
         let others = || {
-            let starts = [Some(self.least_squares(&nominal)), given];
+            let starts = [from_least_squares.then(|| self.least_squares(&nominal)), given];
             starts.into_par_iter().flatten().map(fitted).collect::<Vec<_>>()
         };
         let (first, others) = rayon::join(from_nominal, others);

@@ -86,7 +86,7 @@ impl<const N: usize, const P: usize> ModelSearch<N, P> {
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
     /// Attributes the gap to at most `max_causes` effects, one of which (`known`) may be given beforehand.
     pub fn attribute(&self, max_causes: usize, seed: u64, known: Option<Cause>) -> Attribution<N, P> {
-        let start = self.settle_rigid().0;
+        let start = self.settle_rigid(true).0;
         let scale = self.rough_scale(&start);
         let (settled, mut node) = self.first_node(&start, scale);
         let refit = node.settled.clone();
