@@ -259,9 +259,10 @@ mod tests {
             evidence: Evidence::default(),
             ground: Ground::Motion,
         };
-        let (named, rest) = sorted_causes(&[cause.clone()], 3, against_all(&[2.0, 1.0], &[0.5, 2.0]));
+        let causes = [cause];
+        let (named, rest) = sorted_causes(&causes, 3, against_all(&[2.0, 1.0], &[0.5, 2.0]));
         assert_eq!((named.len(), rest.len()), (1, 0));
-        let (named, rest) = sorted_causes(&[cause], 3, against_all(&[1.0, 2.0], &[0.5, 9.0]));
+        let (named, rest) = sorted_causes(&causes, 3, against_all(&[1.0, 2.0], &[0.5, 9.0]));
         assert!(named.is_empty() && rest[0].why.contains("worse than by the arm file"));
     }
 
