@@ -20,7 +20,7 @@ from armgap import Arm, Diagnosis, Log, _native, diagnose
 from armgap.diagnosis.diagnosis import _columns
 from armgap.evidence import plausibility
 from armgap.simulation import Effect
-from next_experiment.cases import Case, log_of, multisine, play, write_arm
+from next_experiment.cases import Case, log_of, multisine, play, poor, write_arm
 from swings import off, swing
 
 SEVERAL, CONSEQUENCE = 4.0, 1e-3
@@ -71,6 +71,20 @@ def test_a_wrong_arm_file_beside_coarse_encoders_is_a_matter_of_parameters(tmp_p
     for name, true in zip(names, arm.theta, strict=True):
         found_value = found.parameters["refit"][name]
         assert abs(found_value.value - true) < 4 * found_value.sigma, name
+
+
+@pytest.mark.parametrize(("model", "seed"), [("geared", 7101), ("pendulum", 7112)])
+def test_a_large_motion_is_no_outlier_beside_a_small_one(tmp_path: Path, model: str, seed: int) -> None:
+    """The arm file predicts the small log well and the large one badly; re-estimated parameters explain both."""
+    case = Case(model, "stribeck", 1, {"amplitude": 0.1, "velocity": 0.1})
+    arm, arm_file = write_arm(case, seed, tmp_path)
+    small, large = poor(arm, model), multisine(arm_file, model, 5.0, seed)
+    logs = [
+        log_of(play(case, arm, motion, hidden=False), name) for motion, name in ((small, "small"), (large, "large"))
+    ]
+    found = diagnose(logs, arm_file)
+    assert found.verdict == "parameters"
+    assert max(a / f for a, f in zip(found.gap.after, found.gap.floor, strict=True)) < 1.2
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])

@@ -59,7 +59,7 @@ impl WithArm for RigidFit<'_> {
     ) -> Self::Output {
         let Self(request) = self;
         let context = request.context::<A, N, P>(arm, theta, request.training, request.holdout)?;
-        // Not from least squares: they fit torques of a wrong unit that are mostly noise.
+        // Not from a fit without robust weights, which explains torques of a wrong unit that are mostly noise.
         let (_, fit) = context.settle_rigid(false);
         let missed = |hypothesis: &Hypothesis<P>| context.holdout.errors(&context.arm, hypothesis);
         Ok(Refit {

@@ -78,7 +78,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             let first = Rounds::new(&from, self.rough_scale(&from));
             let settled = self.weighted(self.reweighted_until_settled(first, with_zeros).0, with_zeros);
             let fit = self.problem(&settled.weighting).solve(&settled.hypothesis, Effort::FULL);
-            let missed = self.missed(&fit.hypothesis, &EncoderZeros::none());
+            let missed = self.missed(&fit.hypothesis, &settled.weighting.zeros);
             (from, fit, missed)
         };
         let nominal = Hypothesis::rigid(self.prior.theta);

@@ -1,5 +1,5 @@
 //! Choice of the causes that a diagnosis names: probable enough, with values that arms can have and sizes distinct from zero, and no more than
-//! allowed. All others are listed as candidates, with reasons.
+//! allowed, and only where the model with them predicts no worse than the arm file. All others are listed as candidates, with reasons.
 //!
 //! The reported model has the named causes only, so that its gap is the one a reader gets who adds these causes to a simulation.
 
@@ -7,6 +7,7 @@ use crate::disturbance::push::{Conclusion, Disturbance};
 use crate::likelihood::context::{DiagnosisContext, SplitWeighting};
 use crate::likelihood::solve::Fit;
 use crate::model::hypothesis::{EffectInstance, Hypothesis};
+use crate::numeric::products::rms;
 use crate::search::belief::Cause;
 use crate::search::model_search::{Attribution, refresh};
 use armgap_core::arm::Arm;
@@ -114,20 +115,21 @@ fn sorted<T>(
     (named, rest)
 }
 
-/// At most `most` causes to be named, and the rest with the reasons why they are not; `against` is a reason against all.
-fn sorted_causes(causes: &[Cause], most: usize, against: Option<&str>) -> (Vec<Cause>, Vec<Unnamed<Cause>>) {
-    let why_not =
-        |c: &Cause| against.map(str::to_owned).or_else(|| unfit(&c.effect, &c.sigma, c.probability));
-    sorted(causes.to_vec(), most, most, why_not)
+/// At most `most` causes to be named, and the rest with the reasons why they are not.
+fn sorted_causes(causes: &[Cause], most: usize) -> (Vec<Cause>, Vec<Unnamed<Cause>>) {
+    sorted(causes.to_vec(), most, most, |c| unfit(&c.effect, &c.sigma, c.probability))
 }
 
-/// Reason why no cause is named, from the RMS prediction errors on the holdout by joint under the arm file as it stands, `given`, and under the model
-/// that a search found, `found`, which leaves a gap: what has been learnt from the training logs does not hold beyond them.
-fn against_all(given: &[f64], found: &[f64]) -> Option<&'static str> {
-    let worse = given.iter().sum::<f64>() < found.iter().sum();
-    worse.then_some(
-        "with all that was found, held-out motion is predicted worse than by the arm file as it stands",
-    )
+/// Whether errors `found`, one per joint, are larger than `given` in sum.
+fn is_worse(found: &[f64], given: &[f64]) -> bool {
+    found.iter().sum::<f64>() > given.iter().sum()
+}
+
+/// Makes all named causes candidates, because predictions with them are worse than those of the arm file.
+fn withhold(causes: &mut Vec<Cause>, candidates: &mut Vec<Unnamed<Cause>>) {
+    let why = "with the re-estimated parameters and the causes that were found, held-out motion is predicted worse than by the arm file as it stands";
+    let withheld = causes.drain(..).map(|found| Unnamed { found, why: why.to_owned() });
+    candidates.splice(0..0, withheld);
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
@@ -138,8 +140,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     pub fn headline(&mut self, conclusion: Conclusion<N, P>, most: usize) -> Headline<N, P> {
         let Conclusion { mut attribution, alone, mut disturbances } = conclusion;
         self.weigh(&mut attribution);
-        let against = self.against_all(&attribution);
-        let (mut causes, mut candidates) = sorted_causes(&attribution.causes, most, against);
+        let (mut causes, mut candidates) = sorted_causes(&attribution.causes, most);
         disturbances.sort_by(|a, b| b.clarity().total_cmp(&a.clarity()));
         let (disturbances, disturbance_candidates) =
             sorted(disturbances, most - causes.len(), most, |e| unfit(&e.push, &e.sigma, e.probability));
@@ -148,13 +149,17 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             attribution = alone;
             self.set_pushes(&[]);
             self.weigh(&mut attribution);
-            let against = self.against_all(&attribution);
-            (causes, candidates) = sorted_causes(&attribution.causes, most, against);
+            (causes, candidates) = sorted_causes(&attribution.causes, most);
             changed = false;
         }
         self.set_pushes(&disturbances);
         changed |= !candidates.is_empty();
-        let (model, weights, open) = self.reported(&attribution, &causes, &disturbances, changed);
+        let mut reported = self.reported(&attribution, &causes, &disturbances, changed);
+        if reported.2 && !causes.is_empty() && self.is_worse_than_the_arm_file(&reported.0, &reported.1) {
+            withhold(&mut causes, &mut candidates);
+            reported = self.reported(&attribution, &causes, &disturbances, true);
+        }
+        let (model, weights, open) = reported;
         refresh(&model, &mut causes);
         Headline {
             attribution,
@@ -168,13 +173,13 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         }
     }
 
-    /// Reason why none of the causes that a model search has found is named; none if it predicts the holdout better than the arm file does, or leaves no
-    /// gap.
-    fn against_all(&self, attribution: &Attribution<N, P>) -> Option<&'static str> {
-        let errors = |hypothesis: &Hypothesis<P>| self.holdout.errors(&self.arm, hypothesis);
-        let given = Hypothesis::rigid(self.prior.theta);
-        let judged = attribution.is_unexplained() && !attribution.causes.is_empty();
-        judged.then(|| against_all(&errors(&given), &errors(&attribution.model.hypothesis))).flatten()
+    /// Whether a model, beside the encoder zeros of its weights, predicts the holdout worse than the arm file as it stands, which knows of no pushes.
+    fn is_worse_than_the_arm_file(&self, model: &Fit<P>, weights: &SplitWeighting<N>) -> bool {
+        let (data, measured) = (&self.holdout.data, &self.holdout.measured);
+        let arm_file = Hypothesis::rigid(self.prior.theta);
+        let given = data.without_pushes().predict(&self.arm, &arm_file, &data.zero_offsets());
+        let found = data.predict(&self.arm, &model.hypothesis, &weights.holdout.zeros.offsets(data));
+        is_worse(&rms::<N>(measured, &found), &rms::<N>(measured, &given))
     }
 
     /// Model with the named causes alone, its window weights, and whether its gap is open; `changed` says that some found cause or disturbance is not
@@ -191,14 +196,14 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         if !changed {
             return (attribution.model.clone(), last.weights.clone(), open);
         }
+        // The last search node without effects: the arm with parameters re-estimated, and the friction regularisation that was fitted without effects.
+        let bare = |i: &usize| attribution.nodes[*i].settled.hypothesis.effects.is_empty();
+        let node = (0..attribution.nodes.len()).rfind(bare).map_or(last, |i| &attribution.nodes[i]);
         let (mut model, weights, open) = if causes.is_empty() && disturbances.is_empty() {
-            // The last search node without effects: the arm with parameters re-estimated, and the friction regularisation that was fitted without
-            // effects.
-            let bare = |i: &usize| attribution.nodes[*i].settled.hypothesis.effects.is_empty();
-            let node = (0..attribution.nodes.len()).rfind(bare).map_or(last, |i| &attribution.nodes[i]);
             (node.settled.clone(), node.weights.clone(), node.is_unexplained())
         } else {
-            let mut hypothesis = attribution.model.hypothesis.clone();
+            let from = if causes.is_empty() { &node.settled } else { &attribution.model };
+            let mut hypothesis = from.hypothesis.clone();
             hypothesis.effects.retain(|e| causes.iter().any(|c| c.effect.same_place(e)));
             let (model, weights) = self.settle(&hypothesis, last.weights.training.scale);
             (model, weights, open)
@@ -248,7 +253,7 @@ mod tests {
     }
 
     #[test]
-    fn no_cause_is_named_with_which_motion_is_predicted_worse_than_by_the_arm_file() {
+    fn causes_with_which_motion_is_predicted_worse_than_by_the_arm_file_are_candidates() {
         let cause = Cause {
             effect: effect("stribeck", [0.8, 0.3, 0.0]),
             sigma: vec![0.03, 0.02],
@@ -259,11 +264,11 @@ mod tests {
             evidence: Evidence::default(),
             ground: Ground::Motion,
         };
-        let causes = [cause];
-        let (named, rest) = sorted_causes(&causes, 3, against_all(&[2.0, 1.0], &[0.5, 2.0]));
-        assert_eq!((named.len(), rest.len()), (1, 0));
-        let (named, rest) = sorted_causes(&causes, 3, against_all(&[1.0, 2.0], &[0.5, 9.0]));
-        assert!(named.is_empty() && rest[0].why.contains("worse than by the arm file"));
+        assert!(is_worse(&[0.5, 9.0], &[1.0, 2.0]) && !is_worse(&[0.5, 2.0], &[2.0, 1.0]));
+        let (mut named, mut rest) =
+            (vec![cause.clone()], vec![Unnamed { found: cause, why: "small".to_owned() }]);
+        withhold(&mut named, &mut rest);
+        assert!(named.is_empty() && rest.len() == 2 && rest[0].why.contains("worse than by the arm file"));
     }
 
     #[test]

@@ -236,7 +236,9 @@ fn of_trials(tests: &[&ScoreTest], doubted: Option<f64>, rotary: bool) -> RuledO
         ),
         Some(_) if stiffest.is_finite() => (
             Status::Absent,
-            format!("a shaft of up to {stiffest:.3e} {unit} would leave a trace that these logs do not show"),
+            format!(
+                "a shaft of up to {stiffest:.3e} {unit}, with any rotor that was tried, would leave a trace that these logs do not show"
+            ),
         ),
         Some(_) => {
             (Status::Absent, "at trial values it would leave a trace that these logs do not show".to_owned())
