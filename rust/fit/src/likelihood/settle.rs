@@ -85,8 +85,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let given = self.start.filter(|start| *start != self.prior.theta).map(Hypothesis::rigid);
         let from_nominal = || fitted(nominal.clone());
         let others = || {
-            let starts = [from_least_squares.then(|| self.least_squares(&nominal)), given];
-            starts.into_par_iter().flatten().map(fitted).collect::<Vec<_>>()
+            let initial = [from_least_squares.then(|| self.least_squares(&nominal)), given];
+            initial.into_par_iter().flatten().map(fitted).collect::<Vec<_>>()
         };
         let (first, others) = rayon::join(from_nominal, others);
         let (from, fit, _) =
