@@ -154,12 +154,11 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         }
         self.set_pushes(&disturbances);
         changed |= !candidates.is_empty();
-        let mut reported = self.reported(&attribution, &causes, &disturbances, changed);
-        if reported.2 && !causes.is_empty() && self.is_worse_than_the_arm_file(&reported.0, &reported.1) {
+        let (mut model, mut weights, mut open) = self.reported(&attribution, &causes, &disturbances, changed);
+        if open && !causes.is_empty() && self.is_worse_than_the_arm_file(&model, &weights) {
             withhold(&mut causes, &mut candidates);
-            reported = self.reported(&attribution, &causes, &disturbances, true);
+            (model, weights, open) = self.reported(&attribution, &causes, &disturbances, true);
         }
-        let (model, weights, open) = reported;
         refresh(&model, &mut causes);
         Headline {
             attribution,
