@@ -46,13 +46,22 @@ ALIKE = (
     {"rotor_inertia", "payload", "joint_elasticity", "backlash"},
 )
 FAMILIES = (
-    "single", "pair", "clutter", "clutter-only", "hidden-state", "null", "rounding", "presliding", "parameters", "outside",
+    "single", "pair", "clutter", "clutter-only", "clutter-push", "hidden-state", "null", "push", "rounding", "presliding", "parameters",
+    "outside",
 )  # fmt: skip
 #: Smallest and largest width [rad/s] over which the sign of dry friction is smoothed: equal on both joints, and (WIDE) per joint in "rounding".
 WIDTHS = (1e-3, 8e-3)
 WIDE = (1e-3, 5e-2)
 #: Smallest and largest standard deviation [rad] of a joint's encoder zero between recordings, in the families "zeros" and "zeros-null".
 ZEROS = (2e-3, 4e-2)
+
+
+#: Pushes in the families "push" and "clutter-push": largest number in a log; smallest and largest standard deviation in time [s] of their Gaussian
+#: torque, and its peak in Coulomb levels of the joint; least time between two pushes, and from a push to the ends of its log [s].
+PUSHES = 3
+PUSH_WIDTHS = (0.03, 0.13)
+PUSH_PEAKS = (1.5, 4.0)
+PUSH_DISTANCE = 0.8
 
 
 @dataclass
@@ -315,6 +324,18 @@ def hide_transmission(
     return {k: p[k] for k in ("rotor", "shaft", "play", "friction_at_motor") if k in p} | {"encoder_at_motor": side}
 
 
+def draw_pushes(rng: np.random.Generator, machine: Machine, duration: float) -> Array:
+    """Draw the pushes of one log, rows ``[joint, time, width, impulse]`` as `simulate` takes them."""
+    rows: list[list[float]] = []
+    for _ in range(int(rng.integers(0, PUSHES + 1))):
+        j, time = int(rng.integers(2)), float(rng.uniform(PUSH_DISTANCE, duration - PUSH_DISTANCE))
+        width = _log_uniform(rng, PUSH_WIDTHS)
+        peak = float(rng.choice([-1.0, 1.0])) * _log_uniform(rng, PUSH_PEAKS) * machine.joints[j]["coulomb"]
+        if all(abs(time - row[1]) > PUSH_DISTANCE for row in rows):
+            rows.append([float(j), time, width, peak * width * math.sqrt(TURN)])
+    return np.array(rows).reshape(-1, 4)
+
+
 def requests(families: tuple[str, ...]) -> list[tuple[str, int | None]]:
     """Return pairs of each of the given effects and a joint (1 or 2; None for an effect of the whole arm)."""
     return [(name, j) for name in families for j in ((1, 2) if name not in ARM_EFFECTS else (None,))]
@@ -399,18 +420,24 @@ def _make(rng: np.random.Generator, family: str, folder: Path, duration: float) 
             share = float(np.exp(rng.uniform(math.log(0.04), math.log(0.3))))
             values = hide(machine, name, j, share, uses[j], rng)
         effects.append({"effect": name, "joint": joint, "parameters": values})
-    runs = [run(machine, r, s, z) for r, s, z in zip(references, seeds, zeros, strict=True)]
+    pushes = [draw_pushes(rng, machine, duration) if family.endswith("push") else np.zeros((0, 4)) for _ in names]
+    runs = [run(machine, *of) for of in zip(references, seeds, zeros, pushes, strict=True)]
     if not all(_sane(r) for r in [*runs, *without]):
         return None
     exact = family in ("null", "rounding") or (family != "parameters" and rng.uniform() < 0.5)
     trust = np.repeat(TRUST, [5, 4])
     stated = nominal_theta * (1.0 + (0.0 if exact else 1.0) * trust * np.clip(rng.standard_normal(9), -2.5, 2.5))
     folder.mkdir(parents=True, exist_ok=True)
+    listed = [
+        {"log": name, "joint": int(j) + 1, "time": time, "width": width, "impulse": impulse}
+        for name, of in zip(names, pushes, strict=True)
+        for j, time, width, impulse in of.tolist()
+    ]
     (folder / "arm.toml").write_text(_arm_file(machine, stated, trust * np.abs(stated)))
     _write(folder, names, runs)
     key = {
         "family": family, "design": machine.design, "effects": effects, "clutter": small, "exact": exact,
-        "zeros": np.round(zeros, 6).tolist(),
+        "pushes": listed, "zeros": np.round(zeros, 6).tolist(),
         "rounding": [{k: p[k] for k in ("width", "algebraic") if k in p} for p in machine.joints],
     }  # fmt: skip
     if cluttered and mains:

@@ -14,16 +14,42 @@ Record = dict[str, Any]
 EDGES = (0.0, 0.5, 0.75, 0.9, 1.001)
 #: Share of the mean square prediction error below which a hidden effect need not be named.
 HALF = 0.5
+#: Distance in time [s], beyond two of its standard deviations, within which a push counts as found.
+NEAR = 0.1
 
 
 def is_true(record: Record, cause: Record, main_only: bool = False) -> bool:
     """Return whether a cause, or one of its listed equivalents, is in the arm; with `main_only`, is the hidden effect and not clutter."""
+    if cause["effect"] == "external_pulse":
+        return any(is_push(cause, push) for push in record["pushes"])
     hidden = [(h["effect"], h["joint"]) for h in record["effects"] + ([] if main_only else record["clutter"])]
     if not main_only and record["family"].startswith("clutter"):
         # The lag of the current loop and the delay of the commands are in the arms of the clutter families even if they are not in the key.
         hidden += [(effect, j) for effect in ("actuator_lag", "actuator_delay") for j in (1, 2)]
     names = [(cause["effect"], cause["joint"])] + [(e["effect"], e["joint"]) for e in cause["equivalents"]]
     return any(equivalent(n, h) for n in names for h in hidden)
+
+
+def is_push(cause: Record, push: Record) -> bool:
+    """Return whether a push that a diagnosis names is one that was put in: in its log, on its joint, along it, and while it acts."""
+    values = {name: value["value"] for name, value in cause["parameters"].items()}
+    near = abs(values["time"] - push["time"]) < NEAR + 2.0 * push["width"]
+    return bool(
+        (cause["log"], cause["joint"]) == (push["log"], push["joint"])
+        and near
+        and values["impulse"] * push["impulse"] > 0
+    )
+
+
+def pushes(records: list[Record]) -> str:
+    """Return how many pushes were named, how many named ones are false, and how their probabilities compare with shares that are right."""
+    named = [(r, c) for r in records for c in r["causes"] if c["effect"] == "external_pulse"]
+    true = [(r, p) for r in records for p in r["pushes"]]
+    found = sum(any(r is other and is_push(c, p) for other, c in named) for r, p in true)
+    pairs = [(c["probability"], is_true(r, c)) for r, c in named]
+    false = sum(not right for _, right in pairs)
+    bins = "; ".join(_bin(pairs, low, high) for low, high in itertools.pairwise(EDGES))
+    return f"pushes: {found} of {len(true)} named; of {len(named)} named {false} false; {bins}"
 
 
 def report(records: list[Record], cases: bool) -> str:
@@ -60,6 +86,7 @@ def report(records: list[Record], cases: bool) -> str:
             if c["effect"] != "external_pulse"
         ]
         lines.append(f"{label}: " + "; ".join(_bin(pairs, low, high) for low, high in itertools.pairwise(EDGES)))
+    lines += ["", pushes(records)]
     if cases:
         lines += [""] + [_case(r) for r in records if not _right(r)]
         lines += [f"{r['case']}: {r['failed']}" for r in failed]

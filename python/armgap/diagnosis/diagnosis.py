@@ -96,7 +96,7 @@ def diagnose(
     horizon : float, default 0.25
         Prediction horizon [s].
     max_causes : int, default 4
-        Largest number of causes to name.
+        Largest number of effects to name; pushes, which are events of a log, are named besides unless it is 0.
     seed : int, default 1
         Seed of the resampling behind probabilities and intervals.
     effects : sequence of CustomEffect, default none

@@ -35,7 +35,7 @@ __all__ = ["command"]
     "--holdout", multiple=True, type=InputFile(), metavar="LOG…", help="Logs to judge on; after the LOGs to learn from."
 )
 @click.option("--horizon", default=0.25, show_default=True, help="Prediction horizon [s].")
-@click.option("--max-causes", default=4, show_default=True, help="Causes named at most.")
+@click.option("--max-causes", default=4, show_default=True, help="Effects named at most, beside pushes.")
 @click.option(
     "--seed",
     default=1,

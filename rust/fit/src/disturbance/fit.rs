@@ -1,6 +1,7 @@
 //! Output-error fit of a push (external disturbance): impulse, time and duration that minimise the prediction errors of the windows that the push
 //! touches.
 
+use super::outlying::outlying_probability;
 use super::own::Own;
 use super::push::{Disturbance, Place, PushState, SHORTEST};
 use crate::likelihood::context::{DiagnosisContext, WindowSet};
@@ -18,7 +19,7 @@ const MAX_WINDOW_DISTANCE: f64 = 0.25;
 const LONGEST: f64 = 2.5;
 
 /// Least share of the cost of the windows that a push touches which the push must remove to be kept where the model leaves errors unexplained.
-const HELPS: f64 = 0.01;
+const HELPS: f64 = 0.05;
 
 /// Least share of the windows' cost, with the model refitted to the recording, that a push must remove to be kept where the model leaves errors
 /// unexplained; the model fitted to the recording with the push is compared with the model fitted without it.
@@ -89,8 +90,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     /// share is too small.
     ///
     /// The share counts from the cost of the model without the push, or of the model refitted to the recording alone if that is less. Where the model
-    /// leaves errors unexplained and the output error explains too little to be believed, `rough` is returned unchanged if the push lowers the cost
-    /// under the model or under the refitted one. `known` are the recording's further pushes.
+    /// leaves errors unexplained and the output error explains too little to be believed, or leaves the impulse unknown, `rough` is returned unchanged if
+    /// the push lowers the cost under the model or under the refitted one. `known` are the recording's further pushes.
     pub(super) fn sized(
         &self,
         rough: Disturbance,
@@ -132,7 +133,14 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             }
             let push = EffectInstance { p: fitted.into(), ..rough.push };
             let sigma = touched.sigma(&fitted, state.covariance)?;
-            return Some(Disturbance { push, sigma, share: share(left), ..rough });
+            let mut sized = Disturbance { push, sigma, share: share(left), ..rough };
+            if !state.remainder {
+                // Windows far above the typical one show a push that is lost in the scatter of the residual torque.
+                sized.probability = rough.probability.max(outlying_probability(bare, usual));
+            }
+            if sized.is_known() || !state.remainder {
+                return Some(sized);
+            }
         }
         if !state.remainder {
             return None;

@@ -34,6 +34,11 @@ const TRIAL_TIME_STEP: f64 = 0.02;
 /// Impulse of a push, relative to its typical size, for derivatives by finite difference.
 const SLIGHT: f64 = 1e-6;
 
+/// Probability of a push in windows of the cost `cost` that typically have the cost `typical`: a half from [`OUTLYING`] typical costs on.
+pub(super) fn outlying_probability(cost: f64, typical: f64) -> f64 {
+    1.0 - 0.5 * (OUTLYING * typical / cost).min(1.0)
+}
+
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
     /// Adds to the pushes of a log those that explain outlying windows, at most up to `MAX_PUSHES`.
     pub(super) fn in_outlying_windows(
@@ -79,8 +84,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let (all, weighting, residual) = windows(&|_| true);
         let costs = weighting.costs(&all.data, &residual);
         let worst = (0..costs.len()).max_by(|a, b| costs[*a].total_cmp(&costs[*b]))?;
-        let doubt = OUTLYING * weighting.typical / costs[worst];
-        if doubt > 1.0 {
+        if costs[worst] < OUTLYING * weighting.typical {
             return None;
         }
         let firsts: Vec<usize> = all.data.windows.iter().map(|w| w.first).collect();
@@ -112,7 +116,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             push,
             sigma: [0.0; 3],
             share: 0.0,
-            probability: 1.0 - 0.5 * doubt,
+            probability: outlying_probability(costs[worst], weighting.typical),
+            light: false,
         })
     }
 

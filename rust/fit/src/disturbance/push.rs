@@ -14,7 +14,7 @@ use crate::log::track::Track;
 use crate::model::hypothesis::{EffectInstance, Hypothesis};
 use crate::progress::Phase;
 use crate::search::acceptance::{FAINTEST, min_relevance};
-use crate::search::belief::{belief_beside, left_beside, left_over};
+use crate::search::belief::{belief_beside, left_beside};
 use crate::search::model_search::Attribution;
 use armgap_core::arm::Arm;
 use armgap_core::effect::find;
@@ -57,6 +57,8 @@ pub struct Disturbance {
     pub share: f64,
     /// Probability, 0 to 1, of a push rather than some other model error.
     pub probability: f64,
+    /// Whether the torque is certain and too light for a push beside the scatter of friction: what a law leaves, perhaps, and never named itself.
+    pub light: bool,
 }
 
 /// Result of a model search (attribution of the gap to causes), and the external disturbances found in the logs.
@@ -115,11 +117,12 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         seed: u64,
     ) -> Conclusion<N, P> {
         let faint = alone.causes.is_empty();
-        let mut disturbances = self.disturbances(&alone, faint);
+        let mut disturbances = self.pushes_and_lighter(&alone, faint);
         let law = self.law_in_place(&alone, &disturbances);
+        disturbances.retain(|e| !e.light);
         if law.is_some() {
             alone = self.attribute(max_causes, seed, law.clone());
-            disturbances = self.disturbances(&alone, faint);
+            disturbances = self.pushes(&alone, faint);
         }
         if disturbances.is_empty() {
             return Conclusion::without(alone);
@@ -130,15 +133,14 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         if harmful {
             disturbances.clear();
         } else if !alone.is_unexplained() {
-            disturbances = self.disturbances(&beside, faint);
+            disturbances = self.pushes(&beside, faint);
         }
         self.set_pushes(&disturbances);
         if disturbances.is_empty() {
             return Conclusion::without(alone);
         }
-        // A push, like a further cause, is less probable where the gap that it was to explain remains.
-        let left = left_over(&beside.nodes).max(left_beside(&alone.nodes, &beside.nodes));
-        let belief = belief_beside(left, REMAINDER_DOUBT);
+        // A push is less probable where the gap that it was to explain remains, not where the arm lacks effects besides.
+        let belief = belief_beside(left_beside(&alone.nodes, &beside.nodes), REMAINDER_DOUBT);
         for disturbance in &mut disturbances {
             disturbance.probability *= belief;
         }
@@ -146,7 +148,13 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     }
 
     /// Pushes in all recordings that the final model of a model search leaves unexplained; if `faint`, also faint pushes in outlying windows.
-    fn disturbances(&self, attribution: &Attribution<N, P>, faint: bool) -> Vec<Disturbance> {
+    fn pushes(&self, attribution: &Attribution<N, P>, faint: bool) -> Vec<Disturbance> {
+        let found = self.pushes_and_lighter(attribution, faint);
+        found.into_iter().filter(|e| !e.light).collect()
+    }
+
+    /// Pushes as [`Self::pushes`] finds them, and torques that are too light for pushes.
+    fn pushes_and_lighter(&self, attribution: &Attribution<N, P>, faint: bool) -> Vec<Disturbance> {
         let (first, last) = (&attribution.nodes[0], &attribution.nodes[attribution.nodes.len() - 1]);
         let state = PushState {
             model: &attribution.model.hypothesis,
@@ -199,9 +207,12 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let residual = whole.and_then(|track| Residual::new(&self.arm, &track, state.model, &self.prior));
         let Some(found) = residual.and_then(|r| search(&r, state.remainder)) else { return Vec::new() };
         let mut disturbances: Vec<Disturbance> = Vec::new();
-        for bell in &found.bells {
+        for (bell, light) in [(&found.bells, false), (&found.light, true)]
+            .iter()
+            .flat_map(|(bells, light)| bells.iter().map(|bell| (bell, *light)))
+        {
             let Some(rough) = self.rough(places, bell, found.rest) else { continue };
-            disturbances.extend(self.sized(rough, state, own, &disturbances));
+            disturbances.extend(self.sized(Disturbance { light, ..rough }, state, own, &disturbances));
         }
         disturbances.retain(|e| e.is_known() && !self.meets_an_end(e, &found.bells));
         disturbances
@@ -238,6 +249,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             sigma: [sigma * impulse.abs(), sigma * bell.width, sigma * duration],
             share: 0.0,
             probability: 1.0 - 0.5 * (rest / bell.z).powi(2).min(1.0),
+            light: false,
         })
     }
 
@@ -282,7 +294,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
 
 impl Disturbance {
     /// Whether the push's impulse is significantly different from zero.
-    fn is_known(&self) -> bool {
+    pub(super) fn is_known(&self) -> bool {
         self.clarity() > SIGNIFICANT_IMPULSE
     }
 

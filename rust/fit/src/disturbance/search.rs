@@ -2,8 +2,7 @@
 //!
 //! Parameters, unknown effects and pulses are fitted together, linearly; the gain of a pulse at one time, of one width, on one joint is compared with
 //! the scatter around the pulse and reduced by the part that other columns could imitate (generalised likelihood ratio). The largest pulses are added
-//! one by one, as one push hides another by raising the scatter. Doubtful pulses are then removed, and, where the model leaves errors unexplained,
-//! also pulses that stand out only while they are fitted.
+//! one by one, as one push hides another by raising the scatter; which of them are pushes is decided when all are known.
 
 use super::bell::{Bell, all_but};
 use super::linear::{Fitted, Linear};
@@ -24,24 +23,22 @@ const FINE: f64 = 0.01;
 /// Half range of times of the fine search around a pulse, s.
 const FINE_HALF_RANGE: f64 = 0.08;
 
-/// Size, in standard deviations, from which a pulse is tried as a push.
-const TRIED_PULSE: f64 = 2.5;
+/// Size, in standard deviations, down to which pulses are added to the fit. Low, because the first pulses must be found while all others still raise the
+/// scatter: with 2.5 two pushes on one joint of a real arm hid each other.
+const TRIED_PULSE: f64 = 2.0;
 
 /// Size, in standard deviations, from which a pulse is a push where the model describes the arm.
 const LIKELY_PULSE: f64 = 5.0;
 
-/// Size, in standard deviations, from which a pulse is a push where the model leaves errors unexplained and the pulse exceeds the joint's friction.
-const ABOVE_REMAINDER: f64 = 3.9;
+/// Size, in standard deviations of a fit without the pulse and of the friction that no law describes, from which a pulse is a push where the model leaves
+/// errors unexplained. Pushes on a real arm have 3.0 and more.
+const LIKELY_BESIDE_REMAINDER: f64 = 2.9;
 
-/// Size, in standard deviations, from which a pulse is a push where the model leaves errors unexplained, whatever the joint's friction.
+/// Size, in standard deviations, from which a pulse that is no push beside the scatter of friction is a trace of some law.
 const CERTAIN_PULSE: f64 = 12.0;
 
-/// Size, in standard deviations, that the largest pulse of a log must have for pushes to be looked for, while the scatter of the residual torque
-/// still contains all pulses. In a log without such a pulse there is no push, and there are no pushes that hide each other.
-const PROMINENT_PULSE: f64 = 3.6;
-
-/// Least height of a push relative to the joint's friction at rest, where the model leaves errors unexplained.
-const ABOVE_FRICTION: f64 = 1.2;
+/// Standard deviation of the friction of a real joint around any law of friction, relative to the joint's friction at rest.
+const FRICTION_SCATTER: f64 = 0.25;
 
 /// Largest number of pushes looked for in one log; so many are no rare events but something that the arm repeats.
 pub const MAX_PUSHES: usize = 8;
@@ -49,19 +46,14 @@ pub const MAX_PUSHES: usize = 8;
 /// Least time that a joint must move in a log for pushes on it to be looked for, s.
 const MOVES: f64 = 0.5;
 
-/// Pushes found in a log, and the size of the largest pulse that is no push.
+/// Pushes and lighter pulses found in a log, and the size of the largest pulse that is no push.
 pub struct Found {
     /// Gaussian pulses that count as pushes, in the order in which they were found.
     pub bells: Vec<Bell>,
+    /// Pulses that are certain and too light for pushes, where the model leaves errors unexplained.
+    pub light: Vec<Bell>,
     /// Size, in standard deviations, of the largest pulse that is no push.
     pub rest: f64,
-}
-
-impl Found {
-    /// Removes the pulse with index `bell` and keeps its size as that of a pulse that is no push.
-    fn dismiss(&mut self, bell: usize) {
-        self.rest = f64::max(self.rest, self.bells.remove(bell).z.min(LIKELY_PULSE));
-    }
 }
 
 struct Search<'a, const N: usize> {
@@ -76,92 +68,52 @@ struct Search<'a, const N: usize> {
 pub fn search<const N: usize>(residual: &Residual<N>, remainder: bool) -> Option<Found> {
     let chance = vec![vec![1.0; PULSE_WIDTHS.len()]; N];
     let mut search = Search { linear: Linear::new(residual), remainder, chance };
-    let bells = search.gather()?;
-    let mut found = Found { bells, rest: TRIED_PULSE };
-    search.drop_doubtful(&mut found)?;
-    if remainder {
-        search.drop_aided(&mut found)?;
+    let gathered = search.gather()?;
+    let mut found = Found { bells: Vec::new(), light: Vec::new(), rest: TRIED_PULSE };
+    for (bell, stands) in gathered.iter().zip(search.standing(&gathered)?) {
+        if stands {
+            found.bells.push(*bell);
+            continue;
+        }
+        found.rest = found.rest.max(bell.z.min(LIKELY_PULSE));
+        if bell.z > CERTAIN_PULSE {
+            found.light.push(*bell);
+        }
     }
     Some(found)
 }
 
 impl<const N: usize> Search<'_, N> {
-    /// Adds the largest pulses one by one, each fitted in time and width; `None` if the linear fit is singular.
+    /// The largest pulses, added one by one, each fitted in time and width beside the others; `None` if the linear fit is singular.
     fn gather(&mut self) -> Option<Vec<Bell>> {
         let mut bells: Vec<Bell> = Vec::new();
         loop {
             let fitted = self.linear.settle(&bells)?;
             let largest = self.scan(&fitted);
-            if bells.is_empty() && largest.is_none_or(|b| b.z < PROMINENT_PULSE) {
-                return Some(bells);
-            }
             bells = self.refine(bells)?;
-            let Some(next) = largest.filter(|b| b.z > TRIED_PULSE) else { return Some(bells) };
-            if bells.len() == MAX_PUSHES {
-                return Some(bells);
+            match largest.filter(|b| b.z > TRIED_PULSE && bells.len() < MAX_PUSHES) {
+                Some(next) => bells.push(next),
+                None => return Some(bells),
             }
-            bells.push(next);
             bells = self.refine(bells)?;
         }
     }
 
-    /// Removes pulses that are too small to count as pushes when fitted together with the others, the weakest first.
-    fn drop_doubtful(&mut self, found: &mut Found) -> Option<()> {
-        while !found.bells.is_empty() {
-            self.settle(&mut found.bells)?;
-            let doubt = |b: &Bell| if self.stands(b) { b.z } else { 0.0 };
-            let sizes: Vec<f64> = found.bells.iter().map(doubt).collect();
-            let weakest = least(&sizes)?;
-            if self.stands(&found.bells[weakest]) {
-                break;
+    /// Which of the pulses are pushes, with all others fitted. Where the model leaves errors unexplained, a pulse that is fitted takes up errors around it,
+    /// lowers the scatter there and so appears to stand out: it is judged by a fit without it, in which its own torque enlarges the standard deviation.
+    fn standing(&mut self, bells: &[Bell]) -> Option<Vec<bool>> {
+        let stands = |i: usize| {
+            if !self.remainder {
+                return Some(bells[i].z > LIKELY_PULSE);
             }
-            found.dismiss(weakest);
-        }
-        Some(())
-    }
-
-    /// Removes pulses that stand out only while they are fitted, the weakest first: where the model leaves errors unexplained, a pulse takes up
-    /// errors around it, lowers the scatter there and so appears to stand out.
-    fn drop_aided(&mut self, found: &mut Found) -> Option<()> {
-        while !found.bells.is_empty() {
-            let bells = &found.bells;
-            let unaided = |i| if self.stands(&bells[i]) { self.unaided(bells, i) } else { Some(0.0) };
-            let sizes: Vec<f64> = (0..bells.len()).map(unaided).collect::<Option<_>>()?;
-            let weakest = least(&sizes)?;
-            if sizes[weakest] > PROMINENT_PULSE {
-                break;
-            }
-            found.dismiss(weakest);
-            self.settle(&mut found.bells)?;
-        }
-        Some(())
-    }
-
-    /// Refines the times and widths of all pulses in a common fit, with sizes in standard deviations of the residual torque that the fit leaves.
-    fn settle(&mut self, bells: &mut Vec<Bell>) -> Option<()> {
-        let fitted = self.linear.settle(bells)?;
-        self.scan(&fitted);
-        *bells = self.refine(std::mem::take(bells))?;
-        Some(())
-    }
-
-    /// Whether a pulse is large enough to count as a push.
-    fn stands(&self, bell: &Bell) -> bool {
-        let above = bell.height.abs() > ABOVE_FRICTION * self.linear.residual.joints[bell.joint].holding;
-        if self.remainder {
-            bell.z > CERTAIN_PULSE || (bell.z > ABOVE_REMAINDER && above)
-        } else {
-            bell.z > LIKELY_PULSE
-        }
-    }
-
-    /// Size, in standard deviations, of the pulse with index `i` in a fit of the other pulses alone, so that its own torque enlarges the standard
-    /// deviation.
-    fn unaided(&mut self, bells: &[Bell], i: usize) -> Option<f64> {
-        let others = all_but(bells, i);
-        let fitted = self.linear.settle(&others)?;
-        self.scan(&fitted);
-        Some(self.best_near(&fitted, &bells[i], true).z)
+            let others = all_but(bells, i);
+            let fitted = self.linear.settle(&others)?;
+            self.scan(&fitted);
+            let unaided = self.best_near(&fitted, &bells[i], true);
+            let friction = FRICTION_SCATTER * self.linear.residual.joints[unaided.joint].holding;
+            Some(unaided.height.abs() > LIKELY_BESIDE_REMAINDER * unaided.sigma.hypot(friction))
+        };
+        (0..bells.len()).map(stands).collect()
     }
 
     /// Scans pulses of all widths over the log, stores their typical sizes, and returns the largest pulse.
@@ -242,7 +194,72 @@ impl<const N: usize> Search<'_, N> {
     }
 }
 
-/// Index of the smallest number.
-fn least(sizes: &[f64]) -> Option<usize> {
-    (0..sizes.len()).min_by(|&a, &b| sizes[a].total_cmp(&sizes[b]))
+#[cfg(test)]
+mod tests {
+    use super::super::residual::Joint;
+    use super::*;
+    use crate::numeric::random::Random;
+
+    const STEP: f64 = 0.01;
+    /// Friction of the joint at rest, N m.
+    const HOLDING: f64 = 0.25;
+
+    /// Residual torque of a joint that always moves: scatter of a correlation time of 50 ms and of the standard deviation `scatter`, N m, beside pulses
+    /// given as times, s, and heights, N m.
+    fn residual(scatter: f64, pulses: &[(f64, f64)]) -> Residual<1> {
+        let t: Vec<f64> = (0..1000).map(|i| STEP * f64::from(i)).collect();
+        let mut random = Random(5);
+        let (decay, mut level) = ((-STEP / 0.05_f64).exp(), 0.0);
+        let lack = |t: &f64| {
+            level = decay * level + scatter * (1.0 - decay * decay).sqrt() * random.normal();
+            let pulse = |(time, height): &(f64, f64)| {
+                Bell { joint: 0, time: *time, width: 0.09, height: 0.0, sigma: 0.0, z: 0.0 }.at(*t) * height
+            };
+            level + pulses.iter().map(pulse).sum::<f64>()
+        };
+        let lack: Vec<f64> = t.iter().map(lack).collect();
+        let columns = vec![vec![1.0; t.len()]];
+        let rest = vec![0.0; t.len()];
+        let joint = Joint { lack, columns, rest, holding: HOLDING, typical: 1.0 };
+        Residual {
+            activity: vec![vec![1.0; t.len()]],
+            t,
+            step: STEP,
+            joints: [joint],
+            prior: vec![(0.0, 0.1)],
+        }
+    }
+
+    fn times(residual: &Residual<1>, remainder: bool) -> Vec<f64> {
+        let mut times: Vec<f64> = search(residual, remainder).unwrap().bells.iter().map(|b| b.time).collect();
+        times.sort_by(f64::total_cmp);
+        times
+    }
+
+    #[test]
+    fn pushes_that_hide_each_other_are_all_found() {
+        let pulses = [(3.0, 0.8), (4.0, -0.7), (5.0, 0.8)];
+        for remainder in [false, true] {
+            let found = times(&residual(0.05, &pulses), remainder);
+            assert_eq!(found.len(), 3, "{found:?}");
+            assert!(found.iter().zip(&pulses).all(|(t, (time, _))| (t - time).abs() < 0.05), "{found:?}");
+        }
+    }
+
+    #[test]
+    fn scatter_alone_is_no_push() {
+        for remainder in [false, true] {
+            assert!(times(&residual(0.05, &[]), remainder).is_empty());
+        }
+    }
+
+    #[test]
+    fn beside_a_remainder_a_pulse_below_the_scatter_of_friction_is_no_push() {
+        let light = residual(0.01, &[(3.0, 2.0 * FRICTION_SCATTER * HOLDING)]);
+        assert_eq!(times(&light, false).len(), 1);
+        assert!(times(&light, true).is_empty());
+        assert_eq!(search(&light, true).unwrap().light.len(), 1);
+        let heavy = residual(0.01, &[(3.0, 5.0 * FRICTION_SCATTER * HOLDING)]);
+        assert_eq!(times(&heavy, true).len(), 1);
+    }
 }

@@ -1,4 +1,4 @@
-//! Choice of the causes that a diagnosis names: probable enough, with values that arms can have and sizes distinct from zero, and no more than
+//! Choice of the causes that a diagnosis names: probable enough, with values that arms can have and sizes distinct from zero, no more effects than
 //! allowed, and only where the model with them predicts no worse than the arm file. All others are listed as candidates, with reasons.
 //!
 //! The reported model has the named causes only, so that its gap is the one a reader gets who adds these causes to a simulation.
@@ -133,17 +133,19 @@ fn withhold(causes: &mut Vec<Cause>, candidates: &mut Vec<Unnamed<Cause>>) {
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// Names at most `most` causes and external disturbances of a search's `conclusion` together, and fits the model with them.
+    /// Names at most `most` causes of a search's `conclusion`, and its external disturbances, and fits the model with them.
     ///
-    /// Effects come before disturbances, and of disturbances the clearest first. Disturbances that are not named are taken out of the logs; if no
-    /// disturbance is named, the search without disturbances counts.
+    /// A disturbance is an event of one log and no property of the arm, so that any number is named unless `most` is zero. Effects come before
+    /// disturbances, and of disturbances the clearest first. Disturbances that are not named are taken out of the logs; if none is named, the search
+    /// without disturbances counts.
     pub fn headline(&mut self, conclusion: Conclusion<N, P>, most: usize) -> Headline<N, P> {
         let Conclusion { mut attribution, alone, mut disturbances } = conclusion;
         self.weigh(&mut attribution);
         let (mut causes, mut candidates) = sorted_causes(&attribution.causes, most);
+        let pushes_allowed = if most > 0 { usize::MAX } else { 0 };
         disturbances.sort_by(|a, b| b.clarity().total_cmp(&a.clarity()));
         let (disturbances, disturbance_candidates) =
-            sorted(disturbances, most - causes.len(), most, |e| unfit(&e.push, &e.sigma, e.probability));
+            sorted(disturbances, pushes_allowed, most, |e| unfit(&e.push, &e.sigma, e.probability));
         let mut changed = !disturbance_candidates.is_empty();
         if let Some(alone) = alone.filter(|_| changed && disturbances.is_empty()) {
             attribution = alone;
