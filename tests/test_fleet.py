@@ -22,7 +22,7 @@ from armgap.fleet import Entry, Fleet, read_manifest, run_fleet
 from armgap.fleet.manifest import ManifestError
 from armgap.fleet.page import fleet_document, moved
 from armgap.fleet.series import moving, odd
-from armgap.fleet.tables import PARAMETERS, SUMMARY, owner
+from armgap.fleet.tables import PARAMETERS, SUMMARY, owner, parameter_rows, summary_rows
 from armgap.fleet.work import answer, answer_within, content_keys
 from fleet_size.broken import WAYS
 from fleets import fleet_of
@@ -249,6 +249,26 @@ def test_results_belong_to_the_description_and_to_the_files_of_a_folder(tmp_path
     assert len(set(seen)) == len(seen)
     (bag / "0.db3").touch()
     assert key() == seen[-1]
+
+
+def test_pushes_are_one_row_for_each_joint_and_no_parameters_that_drift() -> None:
+    """Two pushes on one joint would be two visits of one time."""
+
+    def push(joint: int, probability: float) -> dict[str, object]:
+        impulse = {"value": 0.1, "sigma": 0.01, "unit": "N m s"}
+        of = {"effect": "external_pulse", "joint": joint, "log": "run 1", "parameters": {"impulse": impulse}}
+        return of | {"probability": probability}
+
+    level = {"value": 0.2, "sigma": 0.01, "unit": "N m"}
+    effect = {"effect": "stribeck", "joint": 1, "probability": 0.9, "parameters": {"amplitude": level}}
+    diagnosis = {
+        "verdict": "effect", "seconds": 1.0, "gap": {"closed": 0.5, "unexplained": 0.5}, "parameters": {"with_causes": {}},
+        "causes": [effect, push(2, 0.4), push(1, 0.5), push(2, 0.6)],
+    }  # fmt: skip
+    entry = Entry("A", "arm.toml", ("a.csv",), (), "2026-01-01", 1)
+    rows = [(row["effect"], row["joint"], row["probability"]) for row in summary_rows(entry, diagnosis)]
+    assert rows == [("stribeck", 1, 0.9), ("external_pulse", 1, 0.5), ("external_pulse", 2, 0.6)]
+    assert {row["of"] for row in parameter_rows(entry, diagnosis)} == {"stribeck:1"}
 
 
 def test_a_coupled_transmission_that_drifts_has_a_place_in_words() -> None:

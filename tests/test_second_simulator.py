@@ -10,7 +10,8 @@ from armgap.simulation import Effect
 
 pytest.importorskip("numba")
 
-from second_simulator.cases import Machine, draw_machine, draw_reference, run
+from second_simulator.cases import Machine, draw_machine, draw_pushes, draw_reference, run
+from second_simulator.scoring import is_push
 
 #: Both integrators and their steps [rad]; encoders are taken out.
 SAME = 2e-7
@@ -145,3 +146,30 @@ def test_play_with_encoder_and_friction_on_either_side(machine: Machine, encoder
     effect = Effect("backlash", joint, {**share, **sides})
     doing, left = (float(np.std(difference(with_it, e, arm_of(nominal), 0.0)[:, 0])) for e in ([], [effect]))
     assert left < 0.2 * doing
+
+
+def test_a_push_moves_its_joint_and_is_scored_by_log_joint_time_and_sign(machine: Machine) -> None:
+    reference = draw_reference(np.random.default_rng(3), machine, 2.0)
+    push = {"log": "train-1", "joint": 2, "time": 1.0, "width": 0.05, "impulse": -0.4}
+    row = np.array([[push["joint"] - 1, push["time"], push["width"], push["impulse"]]])
+    bare, pushed = (run(machine, reference, 0, np.zeros(2), rows) for rows in (None, row))
+    before, after = bare.t < push["time"] - 5 * push["width"], np.abs(bare.t - 1.03) < 0.02
+    assert np.array_equal(bare.q[before], pushed.q[before])
+    assert (pushed.true_dq - bare.true_dq)[after, 1].max() < -0.1
+
+    def named(**other: object) -> dict[str, object]:
+        values = {"log": "train-1 (0 to 1.5 s)", "joint": 2, "time": 1.1, "impulse": -0.3} | other
+        parameters = {name: {"value": values[name]} for name in ("time", "impulse")}
+        return {"effect": "external_pulse", "log": values["log"], "joint": values["joint"], "parameters": parameters}
+
+    assert is_push(named(), push)
+    for other in ({"joint": 1}, {"time": 1.3}, {"impulse": 0.3}, {"log": "train-2"}):
+        assert not is_push(named(**other), push)
+
+
+def test_pushes_are_above_friction_and_apart(machine: Machine) -> None:
+    rows = np.concatenate([draw_pushes(np.random.default_rng(seed), machine, 10.0) for seed in range(40)])
+    assert 30 < len(rows) < 90
+    peaks = np.abs(rows[:, 3]) / (rows[:, 2] * np.sqrt(2 * np.pi))
+    levels = np.array([machine.joints[int(j)]["coulomb"] for j in rows[:, 0]])
+    assert np.all((peaks > 1.49 * levels) & (peaks < 4.01 * levels))

@@ -89,7 +89,8 @@ def answer(folder: Path, horizon: float) -> dict[str, Any]:
         relative = [float((m.error**2 / m.motion**2).mean()) for m in missed]
         share = 1.0 - relative[1] / relative[0]
     return {
-        "case": folder.name, **{k: key[k] for k in ("family", "design", "effects", "clutter", "exact", "pushes")}, "share": share,
+        "case": folder.name, **{k: key[k] for k in ("family", "design", "effects", "clutter", "exact")}, "pushes": key.get("pushes", []),
+        "share": share,
         "verdict": found["verdict"], "causes": causes, "candidates": candidates, "gap": found["gap"], "seconds": seconds,
         "checks": [c["check"] for c in found["checks"]], "where": found["where"][:2], "horizon": horizon,
     }  # fmt: skip

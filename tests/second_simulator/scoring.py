@@ -21,7 +21,7 @@ NEAR = 0.1
 def is_true(record: Record, cause: Record, main_only: bool = False) -> bool:
     """Return whether a cause, or one of its listed equivalents, is in the arm; with `main_only`, is the hidden effect and not clutter."""
     if cause["effect"] == "external_pulse":
-        return any(is_push(cause, push) for push in record["pushes"])
+        return not main_only and any(is_push(cause, push) for push in record.get("pushes", []))
     hidden = [(h["effect"], h["joint"]) for h in record["effects"] + ([] if main_only else record["clutter"])]
     if not main_only and record["family"].startswith("clutter"):
         # The lag of the current loop and the delay of the commands are in the arms of the clutter families even if they are not in the key.
@@ -35,7 +35,7 @@ def is_push(cause: Record, push: Record) -> bool:
     values = {name: value["value"] for name, value in cause["parameters"].items()}
     near = abs(values["time"] - push["time"]) < NEAR + 2.0 * push["width"]
     return bool(
-        (cause["log"], cause["joint"]) == (push["log"], push["joint"])
+        (cause["log"].split(" (")[0], cause["joint"]) == (push["log"], push["joint"])
         and near
         and values["impulse"] * push["impulse"] > 0
     )
@@ -44,7 +44,7 @@ def is_push(cause: Record, push: Record) -> bool:
 def pushes(records: list[Record]) -> str:
     """Return how many pushes were named, how many named ones are false, and how their probabilities compare with shares that are right."""
     named = [(r, c) for r in records for c in r["causes"] if c["effect"] == "external_pulse"]
-    true = [(r, p) for r in records for p in r["pushes"]]
+    true = [(r, p) for r in records for p in r.get("pushes", [])]
     found = sum(any(r is other and is_push(c, p) for other, c in named) for r, p in true)
     pairs = [(c["probability"], is_true(r, c)) for r, c in named]
     false = sum(not right for _, right in pairs)

@@ -54,7 +54,9 @@ def summary_rows(entry: Entry, diagnosis: dict[str, Any]) -> list[Row]:
         {"effect": c["effect"], "joint": c["joint"], "probability": c["probability"]}
         for c in by_joint(diagnosis["causes"])
     ]
-    return [{**of_entry, **cause} for cause in named] or [of_entry]
+    # Several pushes on one joint are one row, with the probability of the surest.
+    places = {(row["effect"], row["joint"]): row for row in sorted(named, key=lambda row: row["probability"])}
+    return [{**of_entry, **row} for row in named if row is places[row["effect"], row["joint"]]] or [of_entry]
 
 
 def failed_row(entry: Entry, error: str, seconds: float | None) -> Row:
@@ -92,11 +94,11 @@ def owner_text(of: str) -> str:
 
 
 def parameter_rows(entry: Entry, diagnosis: dict[str, Any]) -> Iterator[Row]:
-    """Yield rows of ``parameters.parquet``: re-estimated parameters of the arm, and parameters of its named causes."""
+    """Yield rows of ``parameters.parquet``: re-estimated parameters of the arm, and those of its named causes but pushes, which are no property."""
     place = {"robot": entry.robot, "time": entry.time or None}
     arm = diagnosis["parameters"]["with_causes"]
     found = [("arm", name, value) for name, value in arm.items()]
-    for cause in by_joint(diagnosis["causes"]):
+    for cause in by_joint([cause for cause in diagnosis["causes"] if not cause.get("log")]):
         of = owner(cause)
         found += [(of, name, value) for name, value in cause["parameters"].items()]
     for of, name, value in found:

@@ -36,7 +36,11 @@ _DRIFTS = 10
     "--workers", type=click.IntRange(min=1), default=os.cpu_count() or 1, show_default="all cores", help="Processes."
 )
 @click.option("--horizon", type=click.FloatRange(min=0, min_open=True), help="Prediction horizon [s].")
-@click.option("--max-causes", type=click.IntRange(min=0), help="Causes named at most; 0 estimates parameters only.")
+@click.option(
+    "--max-causes",
+    type=click.IntRange(min=0),
+    help="Effects named at most, beside pushes; 0 estimates parameters only.",
+)
 @click.option(
     "--limit",
     "limit_s",

@@ -77,7 +77,7 @@ def _facts(data: Data) -> list[tuple[str, str]]:
     facts = [
         ("arm", f"{arm.get('name', '')} ({arm.get('kind', '')}, {arm.get('n_joints', '')} joints)"),
         ("prediction horizon", f"{options.get('horizon_s', '')} s"),
-        ("causes at most", str(options.get("max_causes", ""))),
+        ("effects at most", str(options.get("max_causes", ""))),
         ("seed of the resampling", str(options.get("seed", ""))),
         (
             "friction",

@@ -26,7 +26,7 @@ from armgap.trial.methods import Method
 
 __all__ = ["STEPWISE"]
 
-#: Stepwise regression: largest number of causes, as in a diagnosis; smallest decrease of BIC by a cause; and upper bound of the
+#: Stepwise regression: largest number of causes, pushes included; smallest decrease of BIC by a cause; and upper bound of the
 #: ratio of the residual powers on the holdout with and without a cause.
 MAX_CAUSES, EVIDENCE, HELD_OUT = 4, 10.0, 0.98
 #: Effects that act in one log only, so that the holdout cannot confirm them.

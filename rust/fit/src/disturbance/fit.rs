@@ -132,14 +132,20 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
                 (fitted, _) = touched.minimise(fitted);
             }
             let push = EffectInstance { p: fitted.into(), ..rough.push };
-            let sigma = touched.sigma(&fitted, state.covariance)?;
-            let mut sized = Disturbance { push, sigma, share: share(left), ..rough };
+            let share = share(left);
+            let sized = touched.sigma(&fitted, state.covariance).map(|sigma| Disturbance {
+                push,
+                sigma,
+                share,
+                ..rough
+            });
             if !state.remainder {
                 // Windows far above the typical one show a push that is lost in the scatter of the residual torque.
-                sized.probability = rough.probability.max(outlying_probability(bare, usual));
+                let probability = rough.probability.max(outlying_probability(bare, usual));
+                return sized.map(|sized| Disturbance { probability, ..sized });
             }
-            if sized.is_known() || !state.remainder {
-                return Some(sized);
+            if sized.as_ref().is_some_and(Disturbance::is_known) {
+                return sized;
             }
         }
         if !state.remainder {

@@ -51,7 +51,7 @@ pub struct Linear<'a, const N: usize> {
     /// Share of the time, 0 to 1, that each joint moves around each grid point.
     pub moving: Vec<Vec<f64>>,
     /// Standard deviation of the residual torque, N m or N, per joint and grid point.
-    scatter: Vec<Vec<f64>>,
+    pub(super) scatter: Vec<Vec<f64>>,
 }
 
 impl<'a, const N: usize> Linear<'a, N> {

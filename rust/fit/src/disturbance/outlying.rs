@@ -34,7 +34,8 @@ const TRIAL_TIME_STEP: f64 = 0.02;
 /// Impulse of a push, relative to its typical size, for derivatives by finite difference.
 const SLIGHT: f64 = 1e-6;
 
-/// Probability of a push in windows of the cost `cost` that typically have the cost `typical`: a half from [`OUTLYING`] typical costs on.
+/// Probability of a push in windows of the cost `cost` that typically have the cost `typical`: a half up to [`OUTLYING`] typical costs, and rising to one
+/// beyond.
 pub(super) fn outlying_probability(cost: f64, typical: f64) -> f64 {
     1.0 - 0.5 * (OUTLYING * typical / cost).min(1.0)
 }

@@ -57,7 +57,7 @@ pub struct Disturbance {
     pub share: f64,
     /// Probability, 0 to 1, of a push rather than some other model error.
     pub probability: f64,
-    /// Whether the torque is certain and too light for a push beside the scatter of friction: what a law leaves, perhaps, and never named itself.
+    /// Whether the torque is certain and yet too light for a push beside the scatter of friction: a first guess for `law_in_place`, never named.
     pub light: bool,
 }
 
@@ -118,7 +118,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     ) -> Conclusion<N, P> {
         let faint = alone.causes.is_empty();
         let mut disturbances = self.pushes_and_lighter(&alone, faint);
-        let law = self.law_in_place(&alone, &disturbances);
+        let law = if max_causes > 0 { self.law_in_place(&alone, &disturbances) } else { None };
         disturbances.retain(|e| !e.light);
         if law.is_some() {
             alone = self.attribute(max_causes, seed, law.clone());
@@ -177,7 +177,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         found.into_iter().flatten().collect()
     }
 
-    /// Pushes in one recording, which consists of the logs at `places`; none if there are `MAX_PUSHES` or more.
+    /// Pushes in one recording, which consists of the logs at `places`, and lighter torques; no pushes if there are `MAX_PUSHES` or more.
     fn in_recording(&self, places: &[Place], state: &PushState<'_, N, P>) -> Vec<Disturbance> {
         let own = Own::new(self, places, state);
         let mut disturbances = Vec::new();
@@ -192,10 +192,13 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             disturbances.retain(|e| !self.meets_an_end(e, &all));
         }
         // `MAX_PUSHES` or more are no rare events, but something that the arm does again and again.
-        if disturbances.len() < MAX_PUSHES { disturbances } else { Vec::new() }
+        if disturbances.iter().filter(|e| !e.light).count() >= MAX_PUSHES {
+            disturbances.retain(|e| e.light);
+        }
+        disturbances
     }
 
-    /// Pushes in a recording that stand out of its residual torque as Gaussian pulses, with sizes by output error.
+    /// Pushes, and lighter torques, that stand out of a recording's residual torque as Gaussian pulses, with sizes by output error.
     fn of_bells(
         &self,
         places: &[Place],
@@ -207,14 +210,14 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let residual = whole.and_then(|track| Residual::new(&self.arm, &track, state.model, &self.prior));
         let Some(found) = residual.and_then(|r| search(&r, state.remainder)) else { return Vec::new() };
         let mut disturbances: Vec<Disturbance> = Vec::new();
-        for (bell, light) in [(&found.bells, false), (&found.light, true)]
-            .iter()
-            .flat_map(|(bells, light)| bells.iter().map(|bell| (bell, *light)))
-        {
-            let Some(rough) = self.rough(places, bell, found.rest) else { continue };
-            disturbances.extend(self.sized(Disturbance { light, ..rough }, state, own, &disturbances));
+        for (bells, light) in [(&found.bells, false), (&found.light, true)] {
+            for bell in bells {
+                let Some(rough) = self.rough(places, bell, found.rest) else { continue };
+                disturbances.extend(self.sized(Disturbance { light, ..rough }, state, own, &disturbances));
+            }
         }
-        disturbances.retain(|e| e.is_known() && !self.meets_an_end(e, &found.bells));
+        let all = [found.bells, found.light].concat();
+        disturbances.retain(|e| e.is_known() && !self.meets_an_end(e, &all));
         disturbances
     }
 

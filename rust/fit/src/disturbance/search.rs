@@ -27,14 +27,14 @@ const FINE_HALF_RANGE: f64 = 0.08;
 /// scatter: with 2.5 two pushes on one joint of a real arm hid each other.
 const TRIED_PULSE: f64 = 2.0;
 
-/// Size, in standard deviations, from which a pulse is a push where the model describes the arm.
+/// Size, in standard deviations, from which a pulse may be a push; where the model describes the arm, it is one.
 const LIKELY_PULSE: f64 = 5.0;
 
-/// Size, in standard deviations of a fit without the pulse and of the friction that no law describes, from which a pulse is a push where the model leaves
-/// errors unexplained. Pushes on a real arm have 3.0 and more.
+/// Size, in standard deviations of a fit without the pulse and of the friction that no law describes, that a push also has where the model leaves errors
+/// unexplained. Pushes on a real arm have 3.0 and more.
 const LIKELY_BESIDE_REMAINDER: f64 = 2.9;
 
-/// Size, in standard deviations, from which a pulse that is no push beside the scatter of friction is a trace of some law.
+/// Size, in standard deviations, from which a pulse that is lighter than a push gives a first guess of a drive's limit or of a stop.
 const CERTAIN_PULSE: f64 = 12.0;
 
 /// Standard deviation of the friction of a real joint around any law of friction, relative to the joint's friction at rest.
@@ -99,21 +99,29 @@ impl<const N: usize> Search<'_, N> {
         }
     }
 
-    /// Which of the pulses are pushes, with all others fitted. Where the model leaves errors unexplained, a pulse that is fitted takes up errors around it,
-    /// lowers the scatter there and so appears to stand out: it is judged by a fit without it, in which its own torque enlarges the standard deviation.
+    /// Which of the pulses are pushes, each judged with all others fitted.
     fn standing(&mut self, bells: &[Bell]) -> Option<Vec<bool>> {
+        let scatter = self.linear.scatter.clone();
         let stands = |i: usize| {
-            if !self.remainder {
+            if bells[i].z < LIKELY_PULSE || !self.remainder {
                 return Some(bells[i].z > LIKELY_PULSE);
             }
-            let others = all_but(bells, i);
-            let fitted = self.linear.settle(&others)?;
-            self.scan(&fitted);
-            let unaided = self.best_near(&fitted, &bells[i], true);
-            let friction = FRICTION_SCATTER * self.linear.residual.joints[unaided.joint].holding;
-            Some(unaided.height.abs() > LIKELY_BESIDE_REMAINDER * unaided.sigma.hypot(friction))
+            self.linear.scatter.clone_from(&scatter);
+            self.stands_unaided(bells, i)
         };
         (0..bells.len()).map(stands).collect()
+    }
+
+    /// Whether the pulse with index `i` is a push beside errors that the model leaves unexplained. A pulse that is fitted takes up such errors around it,
+    /// lowers the scatter there and so appears to stand out: it is judged by a fit of the other pulses alone, in which its own torque is part of the
+    /// scatter.
+    fn stands_unaided(&mut self, bells: &[Bell], i: usize) -> Option<bool> {
+        let fitted = self.linear.settle(&all_but(bells, i))?;
+        self.scan(&fitted);
+        let unaided = self.best_near(&fitted, &bells[i], true);
+        let friction = FRICTION_SCATTER * self.linear.residual.joints[unaided.joint].holding;
+        let is_distinct = unaided.z > 0.0;
+        Some(is_distinct && unaided.height.abs() > LIKELY_BESIDE_REMAINDER * unaided.sigma.hypot(friction))
     }
 
     /// Scans pulses of all widths over the log, stores their typical sizes, and returns the largest pulse.
@@ -207,8 +215,12 @@ mod tests {
     /// Residual torque of a joint that always moves: scatter of a correlation time of 50 ms and of the standard deviation `scatter`, N m, beside pulses
     /// given as times, s, and heights, N m.
     fn residual(scatter: f64, pulses: &[(f64, f64)]) -> Residual<1> {
+        drawn(5, scatter, HOLDING, pulses)
+    }
+
+    fn drawn(seed: u64, scatter: f64, holding: f64, pulses: &[(f64, f64)]) -> Residual<1> {
         let t: Vec<f64> = (0..1000).map(|i| STEP * f64::from(i)).collect();
-        let mut random = Random(5);
+        let mut random = Random(seed);
         let (decay, mut level) = ((-STEP / 0.05_f64).exp(), 0.0);
         let lack = |t: &f64| {
             level = decay * level + scatter * (1.0 - decay * decay).sqrt() * random.normal();
@@ -220,7 +232,7 @@ mod tests {
         let lack: Vec<f64> = t.iter().map(lack).collect();
         let columns = vec![vec![1.0; t.len()]];
         let rest = vec![0.0; t.len()];
-        let joint = Joint { lack, columns, rest, holding: HOLDING, typical: 1.0 };
+        let joint = Joint { lack, columns, rest, holding, typical: 1.0 };
         Residual {
             activity: vec![vec![1.0; t.len()]],
             t,
@@ -247,9 +259,11 @@ mod tests {
     }
 
     #[test]
-    fn scatter_alone_is_no_push() {
+    fn scatter_alone_is_hardly_ever_a_push() {
+        let found = |seed: u64, remainder| times(&drawn(seed, 0.05, 0.0, &[]), remainder).len();
         for remainder in [false, true] {
-            assert!(times(&residual(0.05, &[]), remainder).is_empty());
+            let pushes: usize = (0..20).map(|seed| found(seed, remainder)).sum();
+            assert!(pushes <= 1, "{pushes} in 20 logs of ten seconds on a joint without friction");
         }
     }
 

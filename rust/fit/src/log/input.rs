@@ -29,7 +29,7 @@ pub struct LogData<'a> {
 pub struct Options {
     /// Prediction horizon, s.
     pub horizon: f64,
-    /// Largest number of causes that are named.
+    /// Largest number of effects that are named; pushes are named besides unless it is zero.
     pub max_causes: usize,
     /// Seed of the resampling behind probabilities and intervals.
     pub seed: u64,

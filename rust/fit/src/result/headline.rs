@@ -96,12 +96,10 @@ fn uncertain(effect: &EffectInstance, sigma: &[f64]) -> Option<String> {
     })
 }
 
-/// Splits `all` into at most `allowed` items to be named, for which `why_not` gives no reason, and the rest with reasons; `most` is the limit in
-/// messages.
+/// Splits `all` into at most `allowed` items to be named, for which `why_not` gives no reason, and the rest with reasons.
 fn sorted<T>(
     all: Vec<T>,
     allowed: usize,
-    most: usize,
     why_not: impl Fn(&T) -> Option<String>,
 ) -> (Vec<T>, Vec<Unnamed<T>>) {
     let (mut named, mut rest) = (Vec::new(), Vec::new());
@@ -109,7 +107,9 @@ fn sorted<T>(
         match why_not(&found) {
             Some(why) => rest.push(Unnamed { found, why }),
             None if named.len() < allowed => named.push(found),
-            None => rest.push(Unnamed { found, why: format!("no more than {most} causes were to be named") }),
+            None => {
+                rest.push(Unnamed { found, why: format!("no more than {allowed} causes were to be named") });
+            }
         }
     }
     (named, rest)
@@ -117,7 +117,7 @@ fn sorted<T>(
 
 /// At most `most` causes to be named, and the rest with the reasons why they are not.
 fn sorted_causes(causes: &[Cause], most: usize) -> (Vec<Cause>, Vec<Unnamed<Cause>>) {
-    sorted(causes.to_vec(), most, most, |c| unfit(&c.effect, &c.sigma, c.probability))
+    sorted(causes.to_vec(), most, |c| unfit(&c.effect, &c.sigma, c.probability))
 }
 
 /// Whether errors `found`, one per joint, are larger than `given` in sum.
@@ -135,8 +135,7 @@ fn withhold(causes: &mut Vec<Cause>, candidates: &mut Vec<Unnamed<Cause>>) {
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
     /// Names at most `most` causes of a search's `conclusion`, and its external disturbances, and fits the model with them.
     ///
-    /// A disturbance is an event of one log and no property of the arm, so that any number is named unless `most` is zero. Effects come before
-    /// disturbances, and of disturbances the clearest first. Disturbances that are not named are taken out of the logs; if none is named, the search
+    /// A disturbance is an event of one log and no property of the arm, so that any number is named unless `most` is zero, the clearest first. Disturbances that are not named are taken out of the logs; if none is named, the search
     /// without disturbances counts.
     pub fn headline(&mut self, conclusion: Conclusion<N, P>, most: usize) -> Headline<N, P> {
         let Conclusion { mut attribution, alone, mut disturbances } = conclusion;
@@ -145,7 +144,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let pushes_allowed = if most > 0 { usize::MAX } else { 0 };
         disturbances.sort_by(|a, b| b.clarity().total_cmp(&a.clarity()));
         let (disturbances, disturbance_candidates) =
-            sorted(disturbances, pushes_allowed, most, |e| unfit(&e.push, &e.sigma, e.probability));
+            sorted(disturbances, pushes_allowed, |e| unfit(&e.push, &e.sigma, e.probability));
         let mut changed = !disturbance_candidates.is_empty();
         if let Some(alone) = alone.filter(|_| changed && disturbances.is_empty()) {
             attribution = alone;
@@ -274,11 +273,11 @@ mod tests {
 
     #[test]
     fn one_too_many_is_a_candidate() {
-        let (named, rest) = sorted(vec![1, 2, 3, 4], 2, 3, |x| (*x == 1).then(|| "small".to_owned()));
+        let (named, rest) = sorted(vec![1, 2, 3, 4], 2, |x| (*x == 1).then(|| "small".to_owned()));
         assert_eq!(named, [2, 3]);
         let why: Vec<(i32, &str)> = rest.iter().map(|u| (u.found, u.why.as_str())).collect();
-        assert_eq!(why, [(1, "small"), (4, "no more than 3 causes were to be named")]);
-        let (none, all) = sorted(vec![7], 0, 0, |_| None);
+        assert_eq!(why, [(1, "small"), (4, "no more than 2 causes were to be named")]);
+        let (none, all) = sorted(vec![7], 0, |_| None);
         assert!(none.is_empty() && all.len() == 1);
     }
 }

@@ -486,7 +486,7 @@ pub struct Noise {
 pub struct OptionSummary {
     /// Prediction horizon, s.
     pub horizon_s: f64,
-    /// Largest number of causes that may be named.
+    /// Largest number of effects that may be named; pushes are named besides unless it is zero.
     pub max_causes: usize,
     /// Seed of the random numbers.
     pub seed: u64,
