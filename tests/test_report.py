@@ -160,16 +160,6 @@ def test_the_floor_is_not_called_sensor_noise(case) -> None:
         assert "sensor noise" not in text
 
 
-def test_several_pushes_are_counted_in_the_headline_and_told_apart_in_the_text() -> None:
-    data = copy.deepcopy(cases.named().to_dict())
-    push = data["causes"][0] | {"effect": "external_pulse"}
-    data["causes"] = [push | {"log": "first run"}, push | {"log": "second run"}]
-    which = answers(data)[1]
-    assert which.headline == "External push, joint 1 (2 times)"
-    assert "in first run" in which.detail
-    assert "in second run" in which.detail
-
-
 def test_an_axis_has_forces_in_newtons_and_errors_in_millimetres() -> None:
     arm = Arm("slide", "axis", 0.0, 0.004, np.array([2.0, 0.0, 3.0, 4.0]), sigma=np.array([0.2, 0.1, 1.0, 1.0]))
     t = np.arange(1000) * arm.sample_period

@@ -13,6 +13,7 @@ from armgap import _native
 from armgap._renamed import old_names
 from armgap.literals import SERIAL, joint_units
 from armgap.remainder import exceeds_floor, leaves_part
+from armgap.report.pushes import many_pushes
 from armgap.several_joints import place_text
 
 __all__ = [
@@ -427,7 +428,8 @@ def _which(data: Data) -> tuple[str, str]:
         is_listed = depends and data["verdict"] == "unexplained"
         return headline, f"{text} What stays depends on {depends}." if is_listed else text
     headline = _capital(" and ".join(_counted([f"{title(c['effect'])}, {place_text(c)}" for c in causes])))
-    text = " ".join(_about(cause, alone=len(causes) == 1) for cause in causes)
+    others, sentences = many_pushes(causes)
+    text = " ".join([*(_about(cause, alone=len(causes) == 1) for cause in others), *sentences])
     if doubtful(data):
         headline += " (doubtful)"
         text += " Best candidates only: what they leave is explained by no effect in the library."
