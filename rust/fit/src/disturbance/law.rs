@@ -5,6 +5,7 @@
 //! logs that do not reach it cannot locate it. So the pushes of a joint are compared with an effect that could have caused them, on equal terms: the
 //! model is fitted with either to all windows of all logs, both are judged by one Student-t likelihood, and both are penalised for their free values
 //! (Bayesian information criterion, Schwarz 1978). Each push has three values, an effect a fixed number however often it acts.
+//! Torques that are certain and too light to be named as pushes take part: a limit that is hardly exceeded leaves no more.
 
 use super::push::Disturbance;
 use crate::likelihood::context::{DiagnosisContext, WindowSet};

@@ -109,7 +109,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     ///
     /// Where the model describes the arm, pushes are looked for again under the model fitted together with the first ones. Where the model leaves
     /// errors unexplained, the first pushes are kept, as the second model has taken up part of the pushes. Pushes are rejected if prediction errors
-    /// with pushes are much larger than without. An effect that replaces some pushes stays in the model together with the remaining pushes.
+    /// with pushes are much larger than without. An effect that replaces some pushes, or torques too light for pushes, stays in the model together with
+    /// the remaining pushes.
     pub fn conclude(
         &mut self,
         mut alone: Attribution<N, P>,
