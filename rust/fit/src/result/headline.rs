@@ -135,8 +135,8 @@ fn withhold(causes: &mut Vec<Cause>, candidates: &mut Vec<Unnamed<Cause>>) {
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
     /// Names at most `most` causes of a search's `conclusion`, and its external disturbances, and fits the model with them.
     ///
-    /// A disturbance is an event of one log and no property of the arm, so that any number is named unless `most` is zero, the clearest first. Disturbances that are not named are taken out of the logs; if none is named, the search
-    /// without disturbances counts.
+    /// A disturbance is an event of one log and no property of the arm, so that any number is named unless `most` is zero, the clearest first.
+    /// Disturbances that are not named are taken out of the logs; if none is named, the search without disturbances counts.
     pub fn headline(&mut self, conclusion: Conclusion<N, P>, most: usize) -> Headline<N, P> {
         let Conclusion { mut attribution, alone, mut disturbances } = conclusion;
         self.weigh(&mut attribution);
