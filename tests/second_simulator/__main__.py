@@ -93,6 +93,7 @@ def answer(folder: Path, horizon: float) -> dict[str, Any]:
         "share": share,
         "verdict": found["verdict"], "causes": causes, "candidates": candidates, "gap": found["gap"], "seconds": seconds,
         "checks": [c["check"] for c in found["checks"]], "where": found["where"][:2], "horizon": horizon,
+        "parameters": found["parameters"], "theta": key.get("theta"), "strength": key.get("strength"),
     }  # fmt: skip
 
 

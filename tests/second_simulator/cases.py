@@ -47,8 +47,11 @@ ALIKE = (
 )
 FAMILIES = (
     "single", "pair", "clutter", "clutter-only", "clutter-push", "hidden-state", "null", "push", "rounding", "presliding", "parameters",
-    "outside",
+    "outside", "disturbed",
 )  # fmt: skip
+#: Standard deviations of the random torque in the family "disturbed", relative to the joint's RMS torque; smallest and largest correlation time [s].
+STRENGTHS = (0.02, 0.05, 0.10)
+CORRELATION_TIMES = (0.02, 0.5)
 #: Smallest and largest width [rad/s] over which the sign of dry friction is smoothed: equal on both joints, and (WIDE) per joint in "rounding".
 WIDTHS = (1e-3, 8e-3)
 WIDE = (1e-3, 5e-2)
@@ -406,6 +409,10 @@ def _make(rng: np.random.Generator, family: str, folder: Path, duration: float) 
                 p["lag"] = loop
         for p in machine.joints:
             p["late"] = float(rng.uniform(0.0, 1.0)) * machine.period
+    strength = None
+    if family == "disturbed":
+        strength = float(rng.choice(STRENGTHS))
+        machine.random_torque = [(strength * u.torque, _log_uniform(rng, CORRELATION_TIMES)) for u in uses]
     if with_zeros:
         spread = [_log_uniform(rng, ZEROS) for _ in range(2)]
         zeros = list(rng.normal(0.0, spread, (len(names), 2)))
@@ -437,7 +444,7 @@ def _make(rng: np.random.Generator, family: str, folder: Path, duration: float) 
     _write(folder, names, runs)
     key = {
         "family": family, "design": machine.design, "effects": effects, "clutter": small, "exact": exact,
-        "pushes": listed, "zeros": np.round(zeros, 6).tolist(),
+        "pushes": listed, "zeros": np.round(zeros, 6).tolist(), "theta": nominal_theta.tolist(), "strength": strength,
         "rounding": [{k: p[k] for k in ("width", "algebraic") if k in p} for p in machine.joints],
     }  # fmt: skip
     if cluttered and mains:

@@ -14,6 +14,8 @@ Record = dict[str, Any]
 EDGES = (0.0, 0.5, 0.75, 0.9, 1.001)
 #: Share of the mean square prediction error below which a hidden effect need not be named.
 HALF = 0.5
+#: Names of the parameters of the arm file, in the order of a key's ``theta``.
+PARAMETERS = ("theta1", "theta2", "theta3", "theta4", "theta5", "viscous1", "viscous2", "coulomb1", "coulomb2")
 #: Distance in time [s], beyond two of its standard deviations, within which a push counts as found.
 NEAR = 0.1
 
@@ -52,6 +54,31 @@ def pushes(records: list[Record]) -> str:
     return f"pushes: {found} of {len(true)} named; of {len(named)} named {false} false; {bins}"
 
 
+def intervals(records: list[Record]) -> list[str]:
+    """Return, by strength of the random torques and for all, the share of 95 % intervals of the arm's parameters that hold the true value."""
+    records = [r for r in records if r.get("strength")]
+    lines = []
+    for strength in [*sorted({r["strength"] for r in records}), None]:
+        of = [r for r in records if strength in (None, r["strength"])]
+        if not of:
+            continue
+        held = np.array(
+            [[_holds(r, name, true) for name, true in zip(PARAMETERS, r["theta"], strict=True)] for r in of]
+        )
+        each = ", ".join(f"{name} {share:.2f}" for name, share in zip(PARAMETERS, held.mean(0), strict=True))
+        named = sum(bool(r["causes"]) for r in of)
+        label = "all" if strength is None else f"{strength:.0%} random torque"
+        lines.append(
+            f"intervals, {label}: {len(of)} arms, {held.mean():.3f} hold ({each}); {named} arms have a cause named"
+        )
+    return lines
+
+
+def _holds(record: Record, name: str, true: float) -> bool:
+    found = record["parameters"]["with_causes"][name]
+    return bool(abs(found["value"] - true) < 1.96 * found["sigma"])
+
+
 def report(records: list[Record], cases: bool) -> str:
     """Return the tables of scores as text, with a line for each case that is not right if `cases` is set."""
     failed = [r for r in records if "failed" in r]
@@ -86,7 +113,7 @@ def report(records: list[Record], cases: bool) -> str:
             if c["effect"] != "external_pulse"
         ]
         lines.append(f"{label}: " + "; ".join(_bin(pairs, low, high) for low, high in itertools.pairwise(EDGES)))
-    lines += ["", pushes(records)]
+    lines += ["", pushes(records), *intervals(records)]
     if cases:
         lines += [""] + [_case(r) for r in records if not _right(r)]
         lines += [f"{r['case']}: {r['failed']}" for r in failed]

@@ -175,6 +175,7 @@ impl Request<'_> {
             scales,
             training,
             holdout,
+            horizon: self.options.horizon,
             noise,
             sides,
             custom_effects,

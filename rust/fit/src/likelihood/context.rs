@@ -33,6 +33,8 @@ pub struct DiagnosisContext<A, const N: usize, const P: usize> {
     pub training: WindowSet<N>,
     /// Windows of the holdout, on which causes are judged.
     pub holdout: WindowSet<N>,
+    /// Length of the windows, s.
+    pub horizon: f64,
     /// Standard deviation of the position measurement per joint, rad or m.
     pub noise: [f64; N],
     /// Per joint, the sides of the transmission that encoder and friction may be on, those with both on one side first.
@@ -126,6 +128,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             scales: self.scales.clone(),
             training: WindowSet::new(data.clone()),
             holdout: WindowSet::new(data),
+            horizon: self.horizon,
             noise: self.noise,
             sides: self.sides.clone(),
             custom_effects: self.custom_effects.clone(),

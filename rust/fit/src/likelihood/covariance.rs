@@ -1,25 +1,27 @@
-//! Covariance of fitted values, by the jackknife over windows.
+//! Covariance of fitted values, by the jackknife over blocks of windows.
 //!
-//! Windows are the independent observations. Leaving window `w` out changes the fitted values, to first order, by
+//! Blocks of consecutive windows are the independent observations (Künsch 1989): torques that no model describes are correlated from one window to the
+//! next. Leaving block `b` out changes the fitted values, to first order, by
 //!
 //! ```text
-//! d_w = (H - H_w)^-1 g_w,
+//! d_b = (H - H_b)^-1 g_b,
 //! ```
 //!
-//! with `H` the curvature of the cost, `H_w` the window's part of it and `g_w` its score. The sum of `d_w d_w'` is the jackknife's
-//! covariance (Efron and Stein 1981; CR3 of Bell and `McCaffrey` 2002): unlike the scatter of scores it allows for a window that alone determines
-//! a value and so fits it too well. The number of windows that determine a value sets the Student distribution of its error: with
-//! `a_w = H^-1 H_w H^-1`,
+//! with `H` the curvature of the cost, `H_b` the block's part of it and `g_b` its score. The sum of `d_b d_b'` is the jackknife's
+//! covariance (Efron and Stein 1981; CR3 of Bell and `McCaffrey` 2002): unlike the scatter of scores it allows for a block that alone determines
+//! a value and so fits it too well. The number of blocks that determine a value sets the Student distribution of its error: with
+//! `a_b = H^-1 H_b H^-1`,
 //!
 //! ```text
-//! freedom = (sum of a_w)^2 / sum of a_w^2        (diagonal elements; Satterthwaite 1946)
+//! freedom = (sum of a_b)^2 / sum of a_b^2        (diagonal elements; Satterthwaite 1946)
 //! ```
 
 use crate::likelihood::weighting::Gram;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use statrs::distribution::{ContinuousCDF, StudentsT};
+use std::ops::Range;
 
-/// Factor by which the variance of a fitted value grows when one window is left out, from which the window counts as indispensable to the value.
+/// Factor by which the variance of a fitted value grows when one block is left out, from which the block counts as indispensable to the value.
 const INDISPENSABLE: f64 = 1e3;
 
 /// Addition to the unit diagonal of a scaled curvature matrix that keeps it invertible.
@@ -34,7 +36,7 @@ pub const NORMAL_95: f64 = 1.96;
 /// Covariance of fitted values with the degrees of freedom of their variances.
 #[derive(Debug, Clone)]
 pub struct ParameterCovariance {
-    /// Covariance matrix, with each window as one independent observation.
+    /// Covariance matrix, with each block of windows as one independent observation.
     pub matrix: DMatrix<f64>,
     /// Degrees of freedom of each fitted value's variance.
     pub degrees_of_freedom: Vec<f64>,
@@ -49,13 +51,15 @@ impl ParameterCovariance {
         }
     }
 
-    /// Covariance of values fitted with the inner products `gram`, under a prior of the precisions `prior_precision`. A value that changes no
+    /// Covariance of values fitted with the inner products `gram`, with windows in `blocks`, under a prior of the precisions `prior_precision`. A value that changes no
     /// prediction is taken as uniformly distributed over the width `range`, one per value.
-    pub fn new(gram: &Gram, prior_precision: &[f64], range: &[f64]) -> Self {
+    pub fn new(gram: &Gram, blocks: &[Range<usize>], prior_precision: &[f64], range: &[f64]) -> Self {
         let k = prior_precision.len();
         let precision = |i: usize| gram.total[(i, i)] + prior_precision[i];
         let (seen, unseen): (Vec<usize>, Vec<usize>) = (0..k).partition(|&i| precision(i) > 0.0);
-        let Some(known) = Determined::new(gram, prior_precision, &seen) else { return Self::unknown(k) };
+        let Some(known) = Determined::new(gram, blocks, prior_precision, &seen) else {
+            return Self::unknown(k);
+        };
         let mut spread =
             Self { matrix: DMatrix::zeros(k, k), degrees_of_freedom: vec![NORMAL_DEGREES_OF_FREEDOM; k] };
         for (a, &i) in seen.iter().enumerate() {
@@ -84,7 +88,7 @@ struct Determined {
 }
 
 impl Determined {
-    fn new(gram: &Gram, prior_precision: &[f64], seen: &[usize]) -> Option<Self> {
+    fn new(gram: &Gram, blocks: &[Range<usize>], prior_precision: &[f64], seen: &[usize]) -> Option<Self> {
         let k = seen.len();
         let unit: Vec<f64> =
             seen.iter().map(|&i| (gram.total[(i, i)] + prior_precision[i]).sqrt().recip()).collect();
@@ -95,8 +99,10 @@ impl Determined {
         let inverse = whole.inverse();
         let mut covariance = &inverse * DMatrix::from_diagonal(&trusted) * &inverse;
         let mut sums: Vec<[f64; 2]> = covariance.diagonal().iter().map(|prior| [*prior, 0.0]).collect();
-        for (w, score) in gram.scores.iter().enumerate() {
-            let within = gram.within(w, seen, &unit);
+        for block in blocks {
+            let nothing = DMatrix::zeros(k, k);
+            let within = block.clone().fold(nothing, |sum, w| sum + gram.within(w, seen, &unit));
+            let score = |a: usize| block.clone().map(|w| gram.scores[w][seen[a]]).sum::<f64>() * unit[a];
             let product = &within * &inverse;
             let parts = (0..k).map(|a| inverse.column(a).dot(&product.column(a)));
             let rest = (&curvature - within).cholesky().filter(|rest| determines(rest, &whole));
@@ -105,11 +111,11 @@ impl Determined {
                 sum[1] += if rest.is_some() { part * part } else { 0.0 };
             }
             if let Some(rest) = rest {
-                let mut moved = DVector::from_fn(k, |a, _| score[seen[a]] * unit[a]);
+                let mut moved = DVector::from_fn(k, |a, _| score(a));
                 rest.solve_mut(&mut moved);
                 covariance.ger(1.0, &moved, &moved, 1.0);
             } else {
-                covariance += &inverse * product * relative_cost(gram, w);
+                covariance += &inverse * product * relative_cost(gram, block);
             }
         }
         let degrees_of_freedom = sums
@@ -120,14 +126,16 @@ impl Determined {
     }
 }
 
-/// Cost of a window relative to the mean cost of all windows, at least one.
-fn relative_cost(gram: &Gram, window: usize) -> f64 {
-    let left = |score: &DVector<f64>| score[score.len() - 1];
-    let average = gram.scores.iter().map(left).sum::<f64>() / gram.scores.len() as f64;
-    if average > 0.0 { (left(&gram.scores[window]) / average).max(1.0) } else { 1.0 }
+/// Mean cost of a block's windows relative to that of all windows, at least one.
+fn relative_cost(gram: &Gram, block: &Range<usize>) -> f64 {
+    let mean = |scores: &[DVector<f64>]| {
+        scores.iter().map(|score| score[score.len() - 1]).sum::<f64>() / scores.len() as f64
+    };
+    let average = mean(&gram.scores);
+    if average > 0.0 { (mean(&gram.scores[block.clone()]) / average).max(1.0) } else { 1.0 }
 }
 
-/// Whether the curvature of the cost over all windows but one, with Cholesky factor `rest`, still determines every value given the values before it,
+/// Whether the curvature of the cost over all blocks but one, with Cholesky factor `rest`, still determines every value given the values before it,
 /// compared with the curvature over all windows, with Cholesky factor `whole`.
 fn determines(rest: &Cholesky<f64, Dyn>, whole: &Cholesky<f64, Dyn>) -> bool {
     let (rest, whole) = (rest.l_dirty(), whole.l_dirty());
@@ -138,6 +146,11 @@ fn determines(rest: &Cholesky<f64, Dyn>, whole: &Cholesky<f64, Dyn>) -> bool {
 mod tests {
     use super::*;
     use crate::numeric::random::Random;
+
+    /// Every one of `count` windows as a block of its own.
+    fn alone(count: usize) -> Vec<Range<usize>> {
+        (0..count).map(|w| w..w + 1).collect()
+    }
 
     /// Two values fitted to noise, with regressor columns of the standard deviations `sizes` in each window: the values and their covariance.
     fn fitted(sizes: &[[f64; 2]], random: &mut Random) -> ([f64; 2], ParameterCovariance) {
@@ -163,7 +176,7 @@ mod tests {
             rows.iter().map(|r| [r[0], r[1], r[2] - r[0] * value[0] - r[1] * value[1]]).collect()
         };
         let gram = Gram::of(rows.iter().map(left).map(|r| products(&r)).collect(), 2);
-        ([value[0], value[1]], ParameterCovariance::new(&gram, &[0.0; 2], &[1.0; 2]))
+        ([value[0], value[1]], ParameterCovariance::new(&gram, &alone(sizes.len()), &[0.0; 2], &[1.0; 2]))
     }
 
     #[test]
@@ -207,7 +220,7 @@ mod tests {
     #[test]
     fn a_trusted_value_keeps_its_trust() {
         let gram = Gram::of(vec![vec![1.0, 0.0, 0.5, 0.0, 1e-9, 0.0, 0.5, 0.0, 1.0]; 4], 2);
-        let spread = ParameterCovariance::new(&gram, &[0.0, 25.0], &[1.0; 2]);
+        let spread = ParameterCovariance::new(&gram, &alone(4), &[0.0, 25.0], &[1.0; 2]);
         assert!((spread.matrix[(1, 1)].sqrt() - 0.2).abs() < 1e-6);
         assert!(spread.student_t_factor(1) < 1.01);
     }

@@ -1,9 +1,10 @@
 //! Likelihood of the windows under a hypothesis, and the hypothesis's values of largest likelihood.
 //!
 //! * `context`: arm, prior, scales, training and holdout windows, and their weighting.
-//! * `covariance`: covariance of fitted values by the jackknife over windows.
+//! * `covariance`: covariance of fitted values by the jackknife over blocks of windows.
 //! * `dispersion`: dispersion factor between fits to different motions.
 //! * `holdout`: cost of a fit on the holdout, compared with the cost of noise alone and of predicting no motion.
+//! * `horizon`: standard deviations widened by the change of values with the horizon.
 //! * `jacobian`: Jacobian of the predictions, with columns reused between neighbouring points.
 //! * `scale`: typical sizes of quantities on an arm and its logs.
 //! * `settle`: re-weighting until the scales are those of the residual.
@@ -15,6 +16,7 @@ pub mod covariance;
 pub(crate) mod dispersion;
 pub mod encoder_zero;
 pub mod holdout;
+pub(crate) mod horizon;
 pub(crate) mod jacobian;
 pub mod scale;
 pub(crate) mod settle;

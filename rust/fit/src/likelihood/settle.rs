@@ -100,6 +100,13 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         self.problem(&weighting).solve(start, Effort::FULL).hypothesis
     }
 
+    /// The fit to the training windows with residual scales, rad or m, that agree with it, from the first scales `scale`.
+    pub(crate) fn settled_on_training(&self, start: &Hypothesis<P>, scale: [f64; N]) -> Fit<P> {
+        let with_zeros = EncoderZeros::can_be_told_from(&self.training.data);
+        let Settled { hypothesis, weighting, .. } = self.settled_weighting(start, scale, with_zeros);
+        self.problem(&weighting).solve(&hypothesis, Effort::FULL)
+    }
+
     fn settled(
         &self,
         start: &Hypothesis<P>,

@@ -308,7 +308,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> FitProblem<'_, A, N, P> 
         let prior_precision: Vec<f64> =
             (0..lower.len()).map(|i| if i < P { self.prior.sigma[i].powi(-2) } else { 0.0 }).collect();
         let range: Vec<f64> = lower.iter().zip(&upper).map(|(l, u)| u - l).collect();
-        ParameterCovariance::new(gram, &prior_precision, &range)
+        ParameterCovariance::new(gram, &self.data.blocks(), &prior_precision, &range)
     }
 }
 

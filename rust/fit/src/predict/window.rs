@@ -34,6 +34,13 @@ const MAX_SUBSTEPS_IMPACT: usize = 12;
 /// its rotor in the model does.
 const MAX_SUBSTEPS_STIFF: usize = 100;
 
+/// Length of the blocks of windows that count as independent observations, s: torques that no model describes are correlated over some tenths of a second,
+/// and with them the windows of a log.
+const BLOCK: f64 = 1.0;
+
+/// Largest length of a block relative to `BLOCK`, as windows end where the state is measured best.
+const BLOCK_SLACK: f64 = 1.1;
+
 /// Window of a log: samples `first ..= last` of one track, with predictions from sample `first + 1` (row 0) on.
 #[derive(Debug, Clone, Copy)]
 pub struct Window<const N: usize> {
@@ -78,6 +85,23 @@ impl<const N: usize> Dataset<N> {
         let mut bare = self.clone();
         bare.tracks.iter_mut().for_each(|track| track.pushes.clear());
         bare
+    }
+
+    /// Indices of the windows in blocks: consecutive windows of one track over at most `BLOCK` seconds.
+    pub fn blocks(&self) -> Vec<std::ops::Range<usize>> {
+        let mut blocks: Vec<std::ops::Range<usize>> = Vec::new();
+        for (i, window) in self.windows.iter().enumerate() {
+            let joins = |block: &std::ops::Range<usize>| {
+                let first = &self.windows[block.start];
+                let t = &self.tracks[first.track].t;
+                window.track == first.track && t[window.last] - t[first.first] < BLOCK * BLOCK_SLACK
+            };
+            match blocks.last_mut().filter(|block| joins(block)) {
+                Some(block) => block.end = i + 1,
+                None => blocks.push(i..i + 1),
+            }
+        }
+        blocks
     }
 
     /// The windows of one track selected by `wanted`, as a dataset of this track alone.
@@ -390,4 +414,31 @@ fn step_limits<A: Arm<f64, N, P>, const N: usize, const P: usize>(plant: &Plant<
         (false, false) => 1,
     };
     StepLimits { near_standstill: MAX_SUBSTEPS_FRICTION, elsewhere }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn blocks_last_a_second_and_end_with_their_log() {
+        let track = |count: u32| {
+            let t: Vec<f64> = (0..count).map(|k| 0.01 * f64::from(k)).collect();
+            let q: Vec<f64> = t.iter().map(|t| t.sin()).collect();
+            Track::<1>::new("", &t, &q, &vec![0.0; t.len()], Some([1e-5]))
+        };
+        let data = Dataset::new(vec![track(300), track(150)], 0.25);
+        let blocks = data.blocks();
+        assert_eq!(blocks.iter().map(std::ops::Range::len).sum::<usize>(), data.windows.len());
+        assert!(blocks.windows(2).all(|pair| pair[0].end == pair[1].start));
+        for block in &blocks {
+            let (first, last) = (&data.windows[block.start], &data.windows[block.end - 1]);
+            let t = &data.tracks[first.track].t;
+            assert_eq!(first.track, last.track);
+            assert!(t[last.last] - t[first.first] < BLOCK * BLOCK_SLACK);
+        }
+        assert_eq!(blocks.len(), 3 + 2);
+        let long = Dataset::new(vec![track(900)], 2.0);
+        assert!(long.blocks().iter().all(|block| block.len() == 1));
+    }
 }

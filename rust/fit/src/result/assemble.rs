@@ -46,7 +46,7 @@ pub fn assemble<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     let Headline { attribution, disturbances, .. } = headline;
     let compared = Compared {
         before: Hypothesis::rigid(context.prior.theta),
-        refit: attribution.refit.hypothesis.clone(),
+        refit: headline.refit.hypothesis.clone(),
         after: headline.model.hypothesis.clone(),
     };
     let rotary = description.kind.rotary();
@@ -109,7 +109,7 @@ pub fn assemble<A: Arm<f64, N, P>, const N: usize, const P: usize>(
             .collect(),
         parameters: Parameters {
             nominal: nominal(description),
-            refit: values(&attribution.refit, description),
+            refit: values(&headline.refit, description),
             with_causes: values(&headline.model, description),
         },
         arm: arm_summary(description),

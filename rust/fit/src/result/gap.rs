@@ -20,7 +20,7 @@ const DRAWN: usize = 2500;
 /// Largest number of holdout logs whose curves of positions over time are drawn.
 const DRAWN_LOGS: usize = 3;
 
-/// Number of bootstrap resamples of the holdout windows for the confidence interval of the closed share.
+/// Number of bootstrap resamples of the holdout's blocks of windows for the confidence interval of the closed share.
 const CLOSED_SHARE_RESAMPLES: usize = 500;
 
 /// Prediction horizons at which the gap is reported besides the chosen one, s.
@@ -196,7 +196,7 @@ fn before_scale(before: &[f64]) -> f64 {
     before.iter().copied().fold(f64::MIN_POSITIVE, f64::max)
 }
 
-/// 95 % interval of the closed share of the gap, from bootstrap resamples of the holdout windows.
+/// 95 % interval of the closed share of the gap, from bootstrap resamples of the holdout's blocks of windows.
 fn closed_interval<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     context: &DiagnosisContext<A, N, P>,
     errors: &Errors<N>,
@@ -213,10 +213,11 @@ fn closed_interval<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     };
     let (before, after) = (table(&errors.before), table(&errors.after));
     let mut random = Random(seed);
-    let count = data.windows.len();
+    let blocks = data.blocks();
     let mut shares: Vec<f64> = (0..CLOSED_SHARE_RESAMPLES)
         .map(|_| {
-            let draw: Vec<usize> = (0..count).map(|_| random.below(count)).collect();
+            let block = |_| blocks[random.below(blocks.len())].clone();
+            let draw: Vec<usize> = (0..blocks.len()).flat_map(block).collect();
             let rows: usize = draw.iter().map(|&w| data.windows[w].rows()).sum();
             let pooled = |table: &[[f64; N]]| -> Vec<f64> {
                 (0..N)

@@ -5,6 +5,7 @@
 
 use crate::disturbance::push::{Conclusion, Disturbance};
 use crate::likelihood::context::{DiagnosisContext, SplitWeighting};
+use crate::likelihood::horizon::HorizonChange;
 use crate::likelihood::solve::Fit;
 use crate::model::hypothesis::{EffectInstance, Hypothesis};
 use crate::numeric::products::rms;
@@ -36,6 +37,8 @@ pub struct Unnamed<T> {
 pub struct Headline<const N: usize, const P: usize> {
     /// Result of the model search.
     pub attribution: Attribution<N, P>,
+    /// The arm with its parameters re-estimated and no effects.
+    pub refit: Fit<P>,
     /// Fitted model with the named causes alone.
     pub model: Fit<P>,
     /// Weights of the training and holdout windows under the reported model.
@@ -120,6 +123,14 @@ fn sorted_causes(causes: &[Cause], most: usize) -> (Vec<Cause>, Vec<Unnamed<Caus
     sorted(causes.to_vec(), most, |c| unfit(&c.effect, &c.sigma, c.probability))
 }
 
+/// Adds the squared changes of a cause's values with the horizon to their variances.
+fn widen<const P: usize>(cause: &mut Cause, change: &HorizonChange<P>) {
+    let Some(changes) = change.of_effect(&cause.effect) else { return };
+    for (sigma, change) in cause.sigma.iter_mut().zip(changes) {
+        *sigma = sigma.hypot(*change);
+    }
+}
+
 /// Whether errors `found`, one per joint, are larger than `given` in sum.
 fn is_worse(found: &[f64], given: &[f64]) -> bool {
     found.iter().sum::<f64>() > given.iter().sum()
@@ -161,8 +172,14 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             (model, weights, open) = self.reported(&attribution, &causes, &disturbances, true);
         }
         refresh(&model, &mut causes);
+        let refit = self.refit_with_intervals(&attribution);
+        if let Some(change) = self.change_with_horizon(&model, &weights) {
+            change.widen(&mut model, &self.prior.sigma);
+            causes.iter_mut().for_each(|cause| widen(cause, &change));
+        }
         Headline {
             attribution,
+            refit,
             model,
             weights,
             open,
@@ -171,6 +188,16 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             candidates,
             disturbance_candidates,
         }
+    }
+
+    /// The arm with its parameters re-estimated and no effects, with standard deviations as those of the reported model.
+    fn refit_with_intervals(&self, attribution: &Attribution<N, P>) -> Fit<P> {
+        let (mut refit, weights) = (attribution.refit.clone(), &attribution.nodes[0].weights);
+        self.apply_dispersion_factor(&mut refit, weights);
+        if let Some(change) = self.change_with_horizon(&refit, weights) {
+            change.widen(&mut refit, &self.prior.sigma);
+        }
+        refit
     }
 
     /// Whether a model, beside the encoder zeros of its weights, predicts the holdout worse than the arm file as it stands, which knows of no pushes.

@@ -1,0 +1,103 @@
+//! Standard deviations widened by the change of a fit's values with the horizon.
+//!
+//! Where a controller answers to torques that no model describes, commanded and unmodelled torques are correlated, and output error is biased (Ljung 1999,
+//! section 13.4): the shorter the windows, the more, because the errors of their initial states, which the unmodelled torques make too, then weigh
+//! more. On simulated arms with random torques of 2 to 10 % of the commanded ones the bias at half the horizon is about twice as large, so that the
+//! change of a value from there is an estimate of the bias that is left (docs/decisions/049-intervals-that-hold.md). An error of the model that is
+//! not constant along a window changes the values with the horizon as well.
+
+use crate::likelihood::context::{DiagnosisContext, SplitWeighting};
+use crate::likelihood::solve::Fit;
+use crate::model::hypothesis::{EffectInstance, Hypothesis};
+use crate::predict::window::Dataset;
+use armgap_core::arm::Arm;
+use nalgebra::DVector;
+
+/// Length of the windows to which a model is fitted again, relative to the horizon.
+const SHORTER: f64 = 0.5;
+
+/// Change of a model's free values when it is fitted to shorter windows of the same logs.
+pub(crate) struct HorizonChange<const P: usize> {
+    model: Hypothesis<P>,
+    by_value: DVector<f64>,
+}
+
+impl<const P: usize> HorizonChange<P> {
+    /// Adds the squared changes to the variances of a fit of this model, those of the arm's parameters at most up to the variances `prior`.
+    pub(crate) fn widen(&self, fit: &mut Fit<P>, prior: &[f64; P]) {
+        let room = |i: usize| {
+            if i < P {
+                (prior[i].powi(2) - fit.covariance.matrix[(i, i)]).max(0.0).sqrt()
+            } else {
+                f64::INFINITY
+            }
+        };
+        let change = DVector::from_fn(self.by_value.len(), |i, _| {
+            let room = room(i);
+            self.by_value[i].clamp(-room, room)
+        });
+        if change.iter().all(|change| change.is_finite()) {
+            fit.covariance.matrix.ger(1.0, &change, &change, 1.0);
+        }
+    }
+
+    /// Changes of the parameters of an effect of the model; none for other effects.
+    pub(crate) fn of_effect(&self, effect: &EffectInstance) -> Option<&[f64]> {
+        let place = self.model.effects.iter().position(|e| e.same_place(effect))?;
+        let before: usize = self.model.effects[..place].iter().map(EffectInstance::len).sum();
+        self.by_value.as_slice().get(P + before..P + before + effect.len())
+    }
+}
+
+impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
+    /// Change of the values of a fit under the weights `weights` when it is fitted to windows of half the length; `None` where the logs hold no such
+    /// windows.
+    pub(crate) fn change_with_horizon(
+        &self,
+        fit: &Fit<P>,
+        weights: &SplitWeighting<N>,
+    ) -> Option<HorizonChange<P>> {
+        let data = Dataset::new(self.training.data.tracks.clone(), SHORTER * self.horizon);
+        if data.windows.is_empty() {
+            return None;
+        }
+        let model = fit.hypothesis.clone();
+        let shorter = self.on_windows(data).settled_on_training(&model, weights.training.scale);
+        let (here, there) = (model.values(), shorter.hypothesis.values());
+        let by_value = DVector::from_fn(here.len(), |i, _| there[i] - here[i]);
+        Some(HorizonChange { model, by_value })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::likelihood::covariance::ParameterCovariance;
+    use armgap_core::effect::find;
+    use nalgebra::DMatrix;
+
+    #[test]
+    fn changes_add_to_variances_and_an_arm_s_parameter_keeps_its_prior() {
+        let effect = EffectInstance::new(find::<f64>("stribeck").unwrap(), 0, [0.5, 0.2, 0.0]);
+        let model = Hypothesis::rigid([1.0, 2.0]).with(effect);
+        let by_value = DVector::from_vec(vec![0.3, 9.0, -0.4, 0.0]);
+        let change = HorizonChange { model: model.clone(), by_value };
+        let matrix = DMatrix::from_diagonal_element(4, 4, 0.16);
+        let covariance = ParameterCovariance { matrix, degrees_of_freedom: vec![9.0; 4] };
+        let mut fit = Fit {
+            hypothesis: model,
+            data_cost: 0.0,
+            prior_cost: 0.0,
+            covariance,
+            costs: Vec::new(),
+            own_jacobian: true,
+        };
+        change.widen(&mut fit, &[1.0, 0.5]);
+        for (i, sigma) in [0.5, 0.5, 0.32_f64.sqrt(), 0.4].into_iter().enumerate() {
+            assert!((fit.sigma(i) - sigma).abs() < 1e-12, "{i}: {}", fit.sigma(i));
+        }
+        assert_eq!(change.of_effect(&effect), Some(&[-0.4, 0.0][..]));
+        let elsewhere = EffectInstance { joint: 1, ..effect };
+        assert!(change.of_effect(&elsewhere).is_none());
+    }
+}
