@@ -57,8 +57,6 @@ WIDTHS = (1e-3, 8e-3)
 WIDE = (1e-3, 5e-2)
 #: Smallest and largest standard deviation [rad] of a joint's encoder zero between recordings, in the families "zeros" and "zeros-null".
 ZEROS = (2e-3, 4e-2)
-
-
 #: Pushes in the families "push" and "clutter-push": largest number in a log; smallest and largest standard deviation in time [s] of their Gaussian
 #: torque, and its peak in Coulomb levels of the joint; least time between two pushes, and from a push to the ends of its log [s].
 PUSHES = 3
@@ -292,7 +290,7 @@ def hide(machine: Machine, name: str, j: int, share: float, use: Use, rng: np.ra
         case "product":
             values = {"product": sign * torque / (use.speed * 0.5 * (use.high - use.low))}
         case "random_torque":
-            machine.random_torque[j] = (torque, float(np.exp(rng.uniform(math.log(0.02), math.log(0.5)))))
+            machine.random_torque[j] = (torque, _log_uniform(rng, CORRELATION_TIMES))
             return {"sd": torque, "time": machine.random_torque[j][1]}
         case _:
             raise ValueError(name)
@@ -391,14 +389,8 @@ def _make(rng: np.random.Generator, family: str, folder: Path, duration: float) 
         for name, joint in _beside(rng, mains[0][0] if mains else None):
             j = (joint or 1) - 1
             share = float(np.exp(rng.uniform(math.log(0.006), math.log(0.03))))
-            small.append(
-                {
-                    "effect": name,
-                    "joint": joint,
-                    "parameters": hide(machine, name, j, share, uses[j], rng),
-                    "share": share,
-                }
-            )
+            values = hide(machine, name, j, share, uses[j], rng)
+            small.append({"effect": name, "joint": joint, "parameters": values, "share": share})
         zeros = [rng.normal(0.0, 0.002, 2) for _ in names]
         machine.random_torque = [
             (float(rng.uniform(0.002, 0.01)) * u.torque, float(rng.uniform(0.05, 0.5))) for u in uses
@@ -409,9 +401,8 @@ def _make(rng: np.random.Generator, family: str, folder: Path, duration: float) 
                 p["lag"] = loop
         for p in machine.joints:
             p["late"] = float(rng.uniform(0.0, 1.0)) * machine.period
-    strength = None
-    if family == "disturbed":
-        strength = float(rng.choice(STRENGTHS))
+    strength = float(rng.choice(STRENGTHS)) if family == "disturbed" else None
+    if strength:
         machine.random_torque = [(strength * u.torque, _log_uniform(rng, CORRELATION_TIMES)) for u in uses]
     if with_zeros:
         spread = [_log_uniform(rng, ZEROS) for _ in range(2)]
@@ -431,7 +422,7 @@ def _make(rng: np.random.Generator, family: str, folder: Path, duration: float) 
     runs = [run(machine, *of) for of in zip(references, seeds, zeros, pushes, strict=True)]
     if not all(_sane(r) for r in [*runs, *without]):
         return None
-    exact = family in ("null", "rounding") or (family != "parameters" and rng.uniform() < 0.5)
+    exact = family in ("null", "rounding") or (family not in ("parameters", "disturbed") and rng.uniform() < 0.5)
     trust = np.repeat(TRUST, [5, 4])
     stated = nominal_theta * (1.0 + (0.0 if exact else 1.0) * trust * np.clip(rng.standard_normal(9), -2.5, 2.5))
     folder.mkdir(parents=True, exist_ok=True)

@@ -60,23 +60,17 @@ def intervals(records: list[Record]) -> list[str]:
     lines = []
     for strength in [*sorted({r["strength"] for r in records}), None]:
         of = [r for r in records if strength in (None, r["strength"])]
-        if not of:
-            continue
-        held = np.array(
-            [[_holds(r, name, true) for name, true in zip(PARAMETERS, r["theta"], strict=True)] for r in of]
-        )
-        each = ", ".join(f"{name} {share:.2f}" for name, share in zip(PARAMETERS, held.mean(0), strict=True))
-        named = sum(bool(r["causes"]) for r in of)
-        label = "all" if strength is None else f"{strength:.0%} random torque"
-        lines.append(
-            f"intervals, {label}: {len(of)} arms, {held.mean():.3f} hold ({each}); {named} arms have a cause named"
-        )
+        for model in ("refit", "with_causes") if of else ():
+            held = np.array([[_holds(r, model, i) for i in range(len(PARAMETERS))] for r in of])
+            each = ", ".join(f"{name} {share:.2f}" for name, share in zip(PARAMETERS, held.mean(0), strict=True))
+            label = "all" if strength is None else f"random torque of {strength:.0%}"
+            lines.append(f"intervals, {label}, {model}: {len(of)} arms, {held.mean():.3f} hold ({each})")
     return lines
 
 
-def _holds(record: Record, name: str, true: float) -> bool:
-    found = record["parameters"]["with_causes"][name]
-    return bool(abs(found["value"] - true) < 1.96 * found["sigma"])
+def _holds(record: Record, model: str, i: int) -> bool:
+    found = record["parameters"][model][PARAMETERS[i]]
+    return bool(found["sigma"] is None or abs(found["value"] - record["theta"][i]) < 1.96 * found["sigma"])
 
 
 def report(records: list[Record], cases: bool) -> str:
@@ -100,9 +94,9 @@ def report(records: list[Record], cases: bool) -> str:
                 lines.append(_line(family + label, group))
     lines += ["", "claimed against right: all names of causes and candidates, by family group", ""]
     for label, chosen in {
-        "inside the library": lambda r: r["family"] != "outside",
+        "inside the library": lambda r: r["family"] not in ("outside", "disturbed"),
         "clutter": lambda r: r["family"].startswith("clutter"),
-        "outside": lambda r: r["family"] == "outside",
+        "outside": lambda r: r["family"] in ("outside", "disturbed"),
         "all": lambda r: True,
     }.items():
         pairs = [

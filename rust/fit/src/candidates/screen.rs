@@ -13,7 +13,6 @@ use armgap_core::effect::{Scope, Trial, catalogue};
 use armgap_core::transmission::Sides;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
-use std::ops::Range;
 
 /// Displacement of a candidate's tested parameter for derivatives by forward differences, relative to the parameter's initial guess.
 const TRIAL: f64 = 1e-3;
@@ -35,7 +34,7 @@ pub struct ScoreTest {
     pub gain: f64,
     /// Estimated deviation of the tested parameter from its neutral value, in the parameter's unit.
     pub estimate: f64,
-    /// Standard deviation of the estimated deviation of the tested parameter, from the scatter between blocks of windows.
+    /// Standard deviation of the estimated deviation of the tested parameter, from the scatter between windows.
     pub sigma: f64,
     /// Standard deviation of the tested parameter if the residual were white with the weighting's scale: the smallest that the logs allow.
     pub information_sigma: f64,
@@ -130,7 +129,6 @@ pub fn screen<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     let columns: Vec<&[f64]> = jacobian.columns.iter().chain(&traces).map(Vec::as_slice).collect();
     let gram = problem.weighting.gram_with(k, problem.data, &columns, &residual);
     let last = gram.total.nrows() - 1;
-    let blocks = problem.data.blocks();
     let mut own = gram.total.view((0, 0), (k, k)).into_owned();
     let mut own_score = gram.total.column(last).rows(0, k).into_owned();
     for i in 0..P {
@@ -146,9 +144,7 @@ pub fn screen<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         let raw = gram.total[(c, c)];
         let information = (raw - weights.dot(&cross)).max(1e-12 * raw);
         let slope = gram.total[(c, last)] - weights.dot(&own_score);
-        let of_window = |s: &DVector<f64>| s[c] - weights.dot(&s.rows(0, k));
-        let of_block = |block: &Range<usize>| gram.scores[block.clone()].iter().map(of_window).sum::<f64>();
-        let scatter: f64 = blocks.iter().map(|block| of_block(block).powi(2)).sum();
+        let scatter: f64 = gram.scores.iter().map(|s| (s[c] - weights.dot(&s.rows(0, k))).powi(2)).sum();
         let mut test = scored(effect, raw, information, slope, scatter);
         test.imitation = weights.iter().map(|w| -w).collect();
         test.size = test.admissible(effect);

@@ -32,8 +32,8 @@ const LIKELY_PULSE: f64 = 5.0;
 
 /// Size, in standard deviations of a fit of the larger pulses alone and of the friction that no law describes, from which a pulse and all larger ones
 /// are pushes where the model leaves errors unexplained: the critical value of Rosner's test (1983) at 5 % for the 80 independent pulses that a log of
-/// ten seconds has room for. With 2.9 eight times as many pulses of random torques pass, with 3.7 three quarters as many; the smallest of the four pushes
-/// on a real arm has 3.3 to 4.1 (docs/decisions/050-how-many-pushes.md).
+/// ten seconds has room for. With 2.9 eight times as many pulses of random torques pass, with 3.7 three quarters as many; the last of the four pushes on
+/// a real arm has 3.3 to 4.1 (docs/decisions/050-how-many-pushes.md).
 const LIKELY_BESIDE_REMAINDER: f64 = 3.3;
 
 /// Size, in standard deviations, from which a pulse that is lighter than a push gives a first guess of a drive's limit or of a stop.
@@ -108,15 +108,16 @@ impl<const N: usize> Search<'_, N> {
         }
     }
 
-    /// Which of the pulses are pushes. Where the model describes the arm, those that stand out beside all others; beside errors that the model leaves
-    /// unexplained as many as [`push_count`] counts, the largest first.
+    /// Which of the pulses are pushes: where the model describes the arm, those that stand out beside all others; beside errors that the model leaves
+    /// unexplained as many of these as [`push_count`] counts, the largest first.
     fn standing(&mut self, bells: &[Bell]) -> Option<Vec<bool>> {
-        let likely: Vec<bool> = bells.iter().map(|bell| bell.z > LIKELY_PULSE).collect();
+        let likely = |i: &usize| bells[*i].z > LIKELY_PULSE;
+        let (mut left, mut largest): (Vec<usize>, Vec<usize>) =
+            ((0..bells.len()).filter(likely).collect(), Vec::new());
         if !self.remainder {
-            return Some(likely);
+            return Some((0..bells.len()).map(|i| left.contains(&i)).collect());
         }
         let scatter = self.linear.scatter.clone();
-        let (mut left, mut largest): (Vec<usize>, Vec<usize>) = ((0..bells.len()).collect(), Vec::new());
         let mut sizes = Vec::with_capacity(bells.len());
         while !left.is_empty() {
             self.linear.scatter.clone_from(&scatter);
@@ -129,7 +130,7 @@ impl<const N: usize> Search<'_, N> {
             largest.push(left.remove(place));
         }
         largest.truncate(push_count(&sizes));
-        Some((0..bells.len()).map(|i| likely[i] && largest.contains(&i)).collect())
+        Some((0..bells.len()).map(|i| largest.contains(&i)).collect())
     }
 
     /// Height of a pulse in standard deviations of what a fit without it leaves around it and of the friction that no law describes; zero where columns

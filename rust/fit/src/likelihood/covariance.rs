@@ -99,13 +99,19 @@ impl Determined {
         let inverse = whole.inverse();
         let mut covariance = &inverse * DMatrix::from_diagonal(&trusted) * &inverse;
         let mut sums: Vec<[f64; 2]> = covariance.diagonal().iter().map(|prior| [*prior, 0.0]).collect();
-        for block in blocks {
+        let mut left = blocks.to_vec();
+        while let Some(block) = left.pop() {
             let nothing = DMatrix::zeros(k, k);
             let within = block.clone().fold(nothing, |sum, w| sum + gram.within(w, seen, &unit));
             let score = |a: usize| block.clone().map(|w| gram.scores[w][seen[a]]).sum::<f64>() * unit[a];
             let product = &within * &inverse;
             let parts = (0..k).map(|a| inverse.column(a).dot(&product.column(a)));
             let rest = (&curvature - within).cholesky().filter(|rest| determines(rest, &whole));
+            if rest.is_none() && block.len() > 1 {
+                // Its windows may be dispensable one by one.
+                left.extend(block.map(|w| w..w + 1));
+                continue;
+            }
             for (sum, part) in sums.iter_mut().zip(parts) {
                 sum[0] += part;
                 sum[1] += if rest.is_some() { part * part } else { 0.0 };
@@ -115,7 +121,7 @@ impl Determined {
                 rest.solve_mut(&mut moved);
                 covariance.ger(1.0, &moved, &moved, 1.0);
             } else {
-                covariance += &inverse * product * relative_cost(gram, block);
+                covariance += &inverse * product * relative_cost(gram, block.start);
             }
         }
         let degrees_of_freedom = sums
@@ -126,13 +132,11 @@ impl Determined {
     }
 }
 
-/// Mean cost of a block's windows relative to that of all windows, at least one.
-fn relative_cost(gram: &Gram, block: &Range<usize>) -> f64 {
-    let mean = |scores: &[DVector<f64>]| {
-        scores.iter().map(|score| score[score.len() - 1]).sum::<f64>() / scores.len() as f64
-    };
-    let average = mean(&gram.scores);
-    if average > 0.0 { (mean(&gram.scores[block.clone()]) / average).max(1.0) } else { 1.0 }
+/// Cost of a window relative to the mean cost of all windows, at least one.
+fn relative_cost(gram: &Gram, window: usize) -> f64 {
+    let left = |score: &DVector<f64>| score[score.len() - 1];
+    let average = gram.scores.iter().map(left).sum::<f64>() / gram.scores.len() as f64;
+    if average > 0.0 { (left(&gram.scores[window]) / average).max(1.0) } else { 1.0 }
 }
 
 /// Whether the curvature of the cost over all blocks but one, with Cholesky factor `rest`, still determines every value given the values before it,
@@ -154,6 +158,11 @@ mod tests {
 
     /// Two values fitted to noise, with regressor columns of the standard deviations `sizes` in each window: the values and their covariance.
     fn fitted(sizes: &[[f64; 2]], random: &mut Random) -> ([f64; 2], ParameterCovariance) {
+        let (value, gram) = fitted_gram(sizes, random);
+        (value, ParameterCovariance::new(&gram, &alone(sizes.len()), &[0.0; 2], &[1.0; 2]))
+    }
+
+    fn fitted_gram(sizes: &[[f64; 2]], random: &mut Random) -> ([f64; 2], Gram) {
         let mut rows: Vec<Vec<[f64; 3]>> = sizes
             .iter()
             .map(|size| {
@@ -176,7 +185,7 @@ mod tests {
             rows.iter().map(|r| [r[0], r[1], r[2] - r[0] * value[0] - r[1] * value[1]]).collect()
         };
         let gram = Gram::of(rows.iter().map(left).map(|r| products(&r)).collect(), 2);
-        ([value[0], value[1]], ParameterCovariance::new(&gram, &alone(sizes.len()), &[0.0; 2], &[1.0; 2]))
+        ([value[0], value[1]], gram)
     }
 
     #[test]
@@ -200,6 +209,41 @@ mod tests {
                 assert!((0.93..0.999).contains(&held), "{few:?}: {held}");
             }
         }
+    }
+
+    #[test]
+    fn blocks_count_what_their_windows_share() {
+        let mut random = Random(11);
+        let (cases, blocks, each) = (400, 10, 4);
+        let together: Vec<Range<usize>> = (0..blocks).map(|b| b * each..(b + 1) * each).collect();
+        let mut held = [0.0; 2];
+        for _ in 0..cases {
+            let mut rows: Vec<[f64; 2]> = Vec::new();
+            for _ in 0..blocks {
+                let shared = random.normal();
+                rows.extend((0..each).map(|_| [1.0, shared + 0.3 * random.normal()]));
+            }
+            let products =
+                |row: &[f64; 2]| vec![row[0] * row[0], row[0] * row[1], row[0] * row[1], row[1] * row[1]];
+            let mean = rows.iter().map(|row| row[1]).sum::<f64>() / rows.len() as f64;
+            let left: Vec<Vec<f64>> = rows.iter().map(|row| products(&[row[0], row[1] - mean])).collect();
+            let gram = Gram::of(left, 1);
+            for (share, blocks) in held.iter_mut().zip([&together, &alone(rows.len())]) {
+                let spread = ParameterCovariance::new(&gram, blocks, &[0.0], &[1.0]);
+                let sigma = spread.matrix[(0, 0)].sqrt() * spread.student_t_factor(0);
+                *share += f64::from(u8::from(mean.abs() < NORMAL_95 * sigma)) / f64::from(cases);
+            }
+        }
+        assert!((0.92..0.98).contains(&held[0]) && held[1] < 0.8, "{held:?}");
+    }
+
+    #[test]
+    fn a_block_that_alone_bears_a_value_is_taken_window_by_window() {
+        let sizes: Vec<[f64; 2]> = (0..40).map(|w| [1.0, f64::from(u8::from((4..8).contains(&w)))]).collect();
+        let (_, gram) = fitted_gram(&sizes, &mut Random(2));
+        let blocks: Vec<Range<usize>> = (0..10).map(|b| 4 * b..4 * b + 4).collect();
+        let spread = ParameterCovariance::new(&gram, &blocks, &[0.0; 2], &[1.0; 2]);
+        assert!((2.0..4.5).contains(&spread.degrees_of_freedom[1]), "{:?}", spread.degrees_of_freedom);
     }
 
     #[test]

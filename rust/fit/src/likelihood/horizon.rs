@@ -11,10 +11,15 @@ use crate::likelihood::solve::Fit;
 use crate::model::hypothesis::{EffectInstance, Hypothesis};
 use crate::predict::window::Dataset;
 use armgap_core::arm::Arm;
+use armgap_core::effect::Quantity;
 use nalgebra::DVector;
+use std::f64::consts::{PI, TAU};
 
 /// Length of the windows to which a model is fitted again, relative to the horizon.
 const SHORTER: f64 = 0.5;
+
+/// Number of windows of half the length, relative to those of the horizon, from which they are about half as long: samples may be too far apart.
+const ENOUGH_MORE: f64 = 1.5;
 
 /// Change of a model's free values when it is fitted to shorter windows of the same logs.
 pub(crate) struct HorizonChange<const P: usize> {
@@ -36,9 +41,7 @@ impl<const P: usize> HorizonChange<P> {
             let room = room(i);
             self.by_value[i].clamp(-room, room)
         });
-        if change.iter().all(|change| change.is_finite()) {
-            fit.covariance.matrix.ger(1.0, &change, &change, 1.0);
-        }
+        fit.covariance.matrix.ger(1.0, &change, &change, 1.0);
     }
 
     /// Changes of the parameters of an effect of the model; none for other effects.
@@ -49,6 +52,11 @@ impl<const P: usize> HorizonChange<P> {
     }
 }
 
+/// Whether each parameter of an effect is an angle whose full turns mean nothing.
+fn is_angle(effect: &EffectInstance) -> impl Iterator<Item = bool> {
+    effect.law.spec().parameters.iter().map(|parameter| matches!(parameter.quantity, Quantity::Angle))
+}
+
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
     /// Change of the values of a fit under the weights `weights` when it is fitted to windows of half the length; `None` where the logs hold no such
     /// windows.
@@ -57,15 +65,23 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         fit: &Fit<P>,
         weights: &SplitWeighting<N>,
     ) -> Option<HorizonChange<P>> {
-        let data = Dataset::new(self.training.data.tracks.clone(), SHORTER * self.horizon);
-        if data.windows.is_empty() {
+        let horizon = SHORTER * self.horizon;
+        let data = Dataset::new(self.training.data.tracks.clone(), horizon);
+        if (data.windows.len() as f64) < ENOUGH_MORE * self.training.data.windows.len() as f64 {
             return None;
         }
         let model = fit.hypothesis.clone();
-        let shorter = self.on_windows(data).settled_on_training(&model, weights.training.scale);
-        let (here, there) = (model.values(), shorter.hypothesis.values());
-        let by_value = DVector::from_fn(here.len(), |i, _| there[i] - here[i]);
-        Some(HorizonChange { model, by_value })
+        let beside = Self { horizon, ..self.on_windows(data) };
+        let shorter = beside.settled_next_to(&model, &weights.training).hypothesis;
+        let angles = vec![false; P].into_iter().chain(model.effects.iter().flat_map(is_angle));
+        let (here, there) = (model.values(), shorter.values());
+        let change = |((here, there), angle): ((f64, f64), bool)| {
+            let change = there - here;
+            let change = if angle { (change + PI).rem_euclid(TAU) - PI } else { change };
+            if change.is_finite() { change } else { 0.0 }
+        };
+        let changes: Vec<f64> = here.into_iter().zip(there).zip(angles).map(change).collect();
+        Some(HorizonChange { model, by_value: DVector::from_vec(changes) })
     }
 }
 

@@ -100,10 +100,13 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         self.problem(&weighting).solve(start, Effort::FULL).hypothesis
     }
 
-    /// The fit to the training windows with residual scales, rad or m, that agree with it, from the first scales `scale`.
-    pub(crate) fn settled_on_training(&self, start: &Hypothesis<P>, scale: [f64; N]) -> Fit<P> {
-        let with_zeros = EncoderZeros::can_be_told_from(&self.training.data);
-        let Settled { hypothesis, weighting, .. } = self.settled_weighting(start, scale, with_zeros);
+    /// The fit to the training windows with residual scales that agree with it, next to the model `start` and its weighting `around`, and with encoder
+    /// zeros if that has some.
+    pub(crate) fn settled_next_to(&self, start: &Hypothesis<P>, around: &Weighting<N>) -> Fit<P> {
+        let with_zeros = !around.zeros.recordings.is_empty();
+        let first = Rounds { zeros: around.zeros.clone(), ..Rounds::new(start, around.scale) };
+        let Settled { hypothesis, weighting, .. } =
+            self.weighted(self.reweighted_until_settled(first, with_zeros).0, with_zeros);
         self.problem(&weighting).solve(&hypothesis, Effort::FULL)
     }
 

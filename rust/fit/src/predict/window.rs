@@ -38,6 +38,9 @@ const MAX_SUBSTEPS_STIFF: usize = 100;
 /// and with them the windows of a log.
 const BLOCK: f64 = 1.0;
 
+/// Least number of blocks; a standard error from fewer is worth less than one that neglects what neighbouring windows share.
+const FEWEST_WINDOW_BLOCKS: usize = 8;
+
 /// Largest length of a block relative to `BLOCK`, as windows end where the state is measured best.
 const BLOCK_SLACK: f64 = 1.1;
 
@@ -87,8 +90,17 @@ impl<const N: usize> Dataset<N> {
         bare
     }
 
-    /// Indices of the windows in blocks: consecutive windows of one track over at most `BLOCK` seconds.
+    /// Indices of the windows in blocks: consecutive windows of one track over about `BLOCK` seconds; each window alone where there would be fewer than
+    /// `FEWEST_WINDOW_BLOCKS`.
     pub fn blocks(&self) -> Vec<std::ops::Range<usize>> {
+        let blocks = self.blocks_of_a_length();
+        if blocks.len() >= FEWEST_WINDOW_BLOCKS {
+            return blocks;
+        }
+        (0..self.windows.len()).map(|i| i..i + 1).collect()
+    }
+
+    fn blocks_of_a_length(&self) -> Vec<std::ops::Range<usize>> {
         let mut blocks: Vec<std::ops::Range<usize>> = Vec::new();
         for (i, window) in self.windows.iter().enumerate() {
             let joins = |block: &std::ops::Range<usize>| {
@@ -427,7 +439,7 @@ mod tests {
             let q: Vec<f64> = t.iter().map(|t| t.sin()).collect();
             Track::<1>::new("", &t, &q, &vec![0.0; t.len()], Some([1e-5]))
         };
-        let data = Dataset::new(vec![track(300), track(150)], 0.25);
+        let data = Dataset::new(vec![track(800), track(150)], 0.25);
         let blocks = data.blocks();
         assert_eq!(blocks.iter().map(std::ops::Range::len).sum::<usize>(), data.windows.len());
         assert!(blocks.windows(2).all(|pair| pair[0].end == pair[1].start));
@@ -437,8 +449,9 @@ mod tests {
             assert_eq!(first.track, last.track);
             assert!(t[last.last] - t[first.first] < BLOCK * BLOCK_SLACK);
         }
-        assert_eq!(blocks.len(), 3 + 2);
-        let long = Dataset::new(vec![track(900)], 2.0);
-        assert!(long.blocks().iter().all(|block| block.len() == 1));
+        assert_eq!(blocks.len(), 8 + 2);
+        for few in [Dataset::new(vec![track(1900)], 2.0), Dataset::new(vec![track(300)], 0.25)] {
+            assert_eq!(few.blocks().len(), few.windows.len());
+        }
     }
 }

@@ -110,7 +110,7 @@ pub fn assemble<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         parameters: Parameters {
             nominal: nominal(description),
             refit: values(&headline.refit, description),
-            with_causes: values(&headline.model, description),
+            with_causes: values(&headline.with_causes, description),
         },
         arm: arm_summary(description),
         training: logs(&context.training, &headline.weights.training.zeros, rotary),

@@ -37,8 +37,10 @@ pub struct Unnamed<T> {
 pub struct Headline<const N: usize, const P: usize> {
     /// Result of the model search.
     pub attribution: Attribution<N, P>,
-    /// The arm with its parameters re-estimated and no effects.
+    /// The arm with its parameters re-estimated and no effects, its standard deviations widened by the change with the horizon.
     pub refit: Fit<P>,
+    /// Fitted model with the named causes alone, its standard deviations widened by the change with the horizon.
+    pub with_causes: Fit<P>,
     /// Fitted model with the named causes alone.
     pub model: Fit<P>,
     /// Weights of the training and holdout windows under the reported model.
@@ -172,14 +174,19 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             (model, weights, open) = self.reported(&attribution, &causes, &disturbances, true);
         }
         refresh(&model, &mut causes);
-        let refit = self.refit_with_intervals(&attribution);
-        if let Some(change) = self.change_with_horizon(&model, &weights) {
-            change.widen(&mut model, &self.prior.sigma);
+        let (change, refit) = rayon::join(
+            || self.change_with_horizon(&model, &weights),
+            || self.refit_with_intervals(&attribution),
+        );
+        let mut with_causes = model.clone();
+        if let Some(change) = change {
+            change.widen(&mut with_causes, &self.prior.sigma);
             causes.iter_mut().for_each(|cause| widen(cause, &change));
         }
         Headline {
             attribution,
             refit,
+            with_causes,
             model,
             weights,
             open,
@@ -190,7 +197,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         }
     }
 
-    /// The arm with its parameters re-estimated and no effects, with standard deviations as those of the reported model.
+    /// The arm with its parameters re-estimated and no effects, its standard deviations widened as those of the model with causes are.
     fn refit_with_intervals(&self, attribution: &Attribution<N, P>) -> Fit<P> {
         let (mut refit, weights) = (attribution.refit.clone(), &attribution.nodes[0].weights);
         self.apply_dispersion_factor(&mut refit, weights);
