@@ -46,8 +46,8 @@ pub struct Evidence {
     /// Share, 0 to 1, of bootstrap resamples of the windows on which the cause has the lowest cost of all candidates, at the search node where it was
     /// added.
     pub selected: f64,
-    /// Rise of the holdout's cost without the cause, everything else fitted again, relative to the cost above the noise floor with the cause; none
-    /// where no more than noise remains.
+    /// Rise of the holdout's cost without the cause, everything else fitted again, relative to the cost above the noise floor with the cause; the
+    /// training logs' where no more than noise remains on the holdout, and none where this holds of both.
     pub gain: Option<f64>,
     /// Standard error of the gain, from the scatter between the holdout's windows.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -108,9 +108,17 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         }
         let Attribution { model, on_holdout, causes, .. } = attribution;
         let (model, on_holdout) = (&*model, &*on_holdout);
-        let per_window = |fit: &Fit<P>| self.judged_on_holdout(&last.weights, fit).0;
-        let full = per_window(model).iter().sum::<f64>();
-        let rest = is_more_than_noise(last).then_some(full - last.floor).filter(|rest| *rest > 0.0);
+        let held_out = |fit: &Fit<P>| self.judged_on_holdout(&last.weights, fit).0;
+        let in_training = |fit: &Fit<P>| self.problem(&last.weights.training).window_costs(&fit.hypothesis);
+        let total = |costs: Vec<f64>| costs.iter().sum::<f64>();
+        let rows = self.training.data.rows as f64 / self.holdout.data.rows as f64;
+        let on_holdout_rest = above_noise(total(held_out(model)), last.floor, noise_ratio(last));
+        // A holdout of hardly any motion leaves nothing of a model's errors: what stays on the training logs counts then.
+        let judged_in_training = on_holdout_rest.is_none();
+        let rest = on_holdout_rest
+            .or_else(|| above_noise(total(in_training(model)), rows * last.floor, UNEXPLAINED));
+        let per_window = |fit: &Fit<P>| if judged_in_training { in_training(fit) } else { held_out(fit) };
+        let full = total(per_window(model));
         causes.par_iter_mut().for_each(|cause| {
             let Some(place) = model.hypothesis.effects.iter().position(|e| e.same_place(&cause.effect))
             else {
@@ -128,7 +136,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
                     // The other effects in the model keep the parameters plausible without this cause: only predicted motion can be evidence for it.
                     cause.ground = Ground::Motion;
                 }
-                let rival = self.rival_cost(&taken_out, &last.weights);
+                let rival =
+                    (!judged_in_training).then(|| self.rival_cost(&taken_out, &last.weights)).flatten();
                 cause.evidence.rival_gain = rival.map(|rival| (bare - rival) / rest);
             }
             if let Some((ratio, sigma)) = size_ratio(place, model, on_holdout) {
@@ -167,9 +176,14 @@ fn standard_error_of_sum(terms: &[f64]) -> f64 {
     (n / (n - 1.0).max(1.0) * terms.iter().map(|x| (x - mean).powi(2)).sum::<f64>()).sqrt()
 }
 
-/// Whether the holdout's cost at the last node of a model search is more than noise leaves.
-fn is_more_than_noise<const N: usize, const P: usize>(last: &SearchNode<N, P>) -> bool {
-    last.excess() > if last.is_open() { ABOVE_FLOOR } else { UNEXPLAINED }
+/// Ratio of the holdout's cost to its noise floor, at the last node of a model search, up to which noise may have left it.
+fn noise_ratio<const N: usize, const P: usize>(last: &SearchNode<N, P>) -> f64 {
+    if last.is_open() { ABOVE_FLOOR } else { UNEXPLAINED }
+}
+
+/// Cost above the noise floor; none where the cost is at most `ratio` times the floor, as noise may leave it.
+fn above_noise(cost: f64, floor: f64, ratio: f64) -> Option<f64> {
+    (cost > ratio * floor).then_some(cost - floor).filter(|rest| *rest > 0.0)
 }
 
 /// Size of the effect with index `place` in fit `other`, projected on its amplitudes in fit `of` and relative to them, and the ratio's standard
@@ -214,6 +228,13 @@ mod tests {
     fn a_cause_without_a_rest_beside_it_is_as_sure_as_its_choice() {
         let choice = Evidence { selected: 0.97, gain: None, ..evidence(0.0, Some(-3.0)) };
         assert_eq!(choice.probability(), 0.97);
+    }
+
+    #[test]
+    fn what_noise_may_leave_is_no_rest() {
+        assert_eq!(above_noise(3.0, 1.0, UNEXPLAINED), None);
+        assert_eq!(above_noise(5.0, 1.0, UNEXPLAINED), Some(4.0));
+        assert_eq!(above_noise(0.5, 1.0, 0.0), None);
     }
 
     #[test]
