@@ -4,7 +4,7 @@
 //! * `covariance`: covariance of fitted values by the jackknife over blocks of windows.
 //! * `dispersion`: dispersion factor between fits to different motions.
 //! * `holdout`: cost of a fit on the holdout, compared with the cost of noise alone and of predicting no motion.
-//! * `horizon`: standard deviations widened by the change of values with the horizon.
+//! * `horizon`: standard deviations widened by the bias that the change of values with the horizon tells.
 //! * `jacobian`: Jacobian of the predictions, with columns reused between neighbouring points.
 //! * `scale`: typical sizes of quantities on an arm and its logs.
 //! * `settle`: re-weighting until the scales are those of the residual.

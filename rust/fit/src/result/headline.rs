@@ -5,7 +5,7 @@
 
 use crate::disturbance::push::{Conclusion, Disturbance};
 use crate::likelihood::context::{DiagnosisContext, SplitWeighting};
-use crate::likelihood::horizon::HorizonChange;
+use crate::likelihood::horizon::HorizonBias;
 use crate::likelihood::solve::Fit;
 use crate::model::hypothesis::{EffectInstance, Hypothesis};
 use crate::numeric::products::rms;
@@ -37,9 +37,9 @@ pub struct Unnamed<T> {
 pub struct Headline<const N: usize, const P: usize> {
     /// Result of the model search.
     pub attribution: Attribution<N, P>,
-    /// The arm with its parameters re-estimated and no effects, its standard deviations widened by the change with the horizon.
+    /// The arm with its parameters re-estimated and no effects, its standard deviations widened by the bias that the horizon tells.
     pub refit: Fit<P>,
-    /// Fitted model with the named causes alone, its standard deviations widened by the change with the horizon.
+    /// Fitted model with the named causes alone, its standard deviations widened by the bias that the horizon tells.
     pub with_causes: Fit<P>,
     /// Fitted model with the named causes alone.
     pub model: Fit<P>,
@@ -125,11 +125,11 @@ fn sorted_causes(causes: &[Cause], most: usize) -> (Vec<Cause>, Vec<Unnamed<Caus
     sorted(causes.to_vec(), most, |c| unfit(&c.effect, &c.sigma, c.probability))
 }
 
-/// Adds the squared changes of a cause's values with the horizon to their variances.
-fn widen<const P: usize>(cause: &mut Cause, change: &HorizonChange<P>) {
-    let Some(changes) = change.of_effect(&cause.effect) else { return };
-    for (sigma, change) in cause.sigma.iter_mut().zip(changes) {
-        *sigma = sigma.hypot(*change);
+/// Adds the squared biases of a cause's values to their variances.
+fn widen<const P: usize>(cause: &mut Cause, bias: &HorizonBias<P>) {
+    let Some(biases) = bias.of_effect(&cause.effect) else { return };
+    for (sigma, bias) in cause.sigma.iter_mut().zip(biases) {
+        *sigma = sigma.hypot(*bias);
     }
 }
 
@@ -174,14 +174,14 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             (model, weights, open) = self.reported(&attribution, &causes, &disturbances, true);
         }
         refresh(&model, &mut causes);
-        let (change, refit) = rayon::join(
-            || self.change_with_horizon(&model, &weights),
+        let (bias, refit) = rayon::join(
+            || self.bias_by_horizon(&model, &weights),
             || self.refit_with_intervals(&attribution),
         );
         let mut with_causes = model.clone();
-        if let Some(change) = change {
-            change.widen(&mut with_causes, &self.prior.sigma);
-            causes.iter_mut().for_each(|cause| widen(cause, &change));
+        if let Some(bias) = bias {
+            bias.widen(&mut with_causes, &self.prior.sigma);
+            causes.iter_mut().for_each(|cause| widen(cause, &bias));
         }
         Headline {
             attribution,
@@ -201,8 +201,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     fn refit_with_intervals(&self, attribution: &Attribution<N, P>) -> Fit<P> {
         let (mut refit, weights) = (attribution.refit.clone(), &attribution.nodes[0].weights);
         self.apply_dispersion_factor(&mut refit, weights);
-        if let Some(change) = self.change_with_horizon(&refit, weights) {
-            change.widen(&mut refit, &self.prior.sigma);
+        if let Some(bias) = self.bias_by_horizon(&refit, weights) {
+            bias.widen(&mut refit, &self.prior.sigma);
         }
         refit
     }
