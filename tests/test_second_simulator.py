@@ -11,7 +11,7 @@ from armgap.simulation import Effect
 pytest.importorskip("numba")
 
 from second_simulator.cases import Machine, draw_machine, draw_pushes, draw_reference, run
-from second_simulator.scoring import is_push
+from second_simulator.scoring import PARAMETERS, intervals, is_push
 
 #: Both integrators and their steps [rad]; encoders are taken out.
 SAME = 2e-7
@@ -173,3 +173,22 @@ def test_pushes_are_above_friction_and_apart(machine: Machine) -> None:
     peaks = np.abs(rows[:, 3]) / (rows[:, 2] * np.sqrt(2 * np.pi))
     levels = np.array([machine.joints[int(j)]["coulomb"] for j in rows[:, 0]])
     assert np.all((peaks > 1.49 * levels) & (peaks < 4.01 * levels))
+
+
+def test_intervals_hold_the_true_value_or_not():
+    """An interval of 1.96 standard deviations around the value holds the true one; a deviation that is unknown always does."""
+
+    def record(off: float, sigma: float | None) -> dict:
+        fitted = {name: {"value": 1.0, "sigma": 0.1} for name in PARAMETERS} | {
+            "theta1": {"value": 1.0 + off, "sigma": sigma}
+        }
+        return {
+            "strength": 0.05,
+            "theta": [1.0] * len(PARAMETERS),
+            "parameters": {"refit": fitted, "with_causes": fitted},
+        }
+
+    lines = intervals([record(0.19, 0.1), record(0.2, 0.1), record(9.0, None), {"strength": None}])
+    assert len(lines) == 4
+    assert all("3 arms, 0.963 hold (theta1 0.67, theta2 1.00" in line for line in lines)
+    assert intervals([]) == []
