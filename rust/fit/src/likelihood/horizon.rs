@@ -32,21 +32,9 @@ pub(crate) struct HorizonBias<const P: usize> {
 }
 
 impl<const P: usize> HorizonBias<P> {
-    /// Adds the squared biases that the changes stand for to the variances of a fit of this model, those of the arm's parameters at most up to `prior`
-    /// squared.
-    pub(crate) fn widen(&self, fit: &mut Fit<P>, prior: &[f64; P]) {
-        let room = |i: usize| {
-            if i < P {
-                (prior[i].powi(2) - fit.covariance.matrix[(i, i)]).max(0.0).sqrt()
-            } else {
-                f64::INFINITY
-            }
-        };
-        let bias = DVector::from_fn(self.by_value.len(), |i, _| {
-            let room = room(i);
-            self.by_value[i].clamp(-room, room)
-        });
-        fit.covariance.matrix.ger(1.0, &bias, &bias, 1.0);
+    /// Adds the squared biases to the variances of a fit of this model, also beyond the arm file's: a biased fit may be worse than none.
+    pub(crate) fn widen(&self, fit: &mut Fit<P>) {
+        fit.covariance.matrix.ger(1.0, &self.by_value, &self.by_value, 1.0);
     }
 
     /// Biases of the parameters of an effect of the model; none for other effects.
@@ -99,10 +87,10 @@ mod tests {
     use nalgebra::DMatrix;
 
     #[test]
-    fn biases_add_to_variances_and_an_arm_s_parameter_keeps_its_prior() {
+    fn biases_add_to_variances_and_are_those_of_their_effect() {
         let effect = EffectInstance::new(find::<f64>("stribeck").unwrap(), 0, [0.5, 0.2, 0.0]);
         let model = Hypothesis::rigid([1.0, 2.0]).with(effect);
-        let by_value = DVector::from_vec(vec![0.3, 9.0, -0.4, 0.0]);
+        let by_value = DVector::from_vec(vec![0.3, 0.0, -0.4, 0.0]);
         let bias = HorizonBias { model: model.clone(), by_value };
         let matrix = DMatrix::from_diagonal_element(4, 4, 0.16);
         let covariance = ParameterCovariance { matrix, degrees_of_freedom: vec![9.0; 4] };
@@ -114,8 +102,8 @@ mod tests {
             costs: Vec::new(),
             own_jacobian: true,
         };
-        bias.widen(&mut fit, &[1.0, 0.5]);
-        for (i, sigma) in [0.5, 0.5, 0.32_f64.sqrt(), 0.4].into_iter().enumerate() {
+        bias.widen(&mut fit);
+        for (i, sigma) in [0.5, 0.4, 0.32_f64.sqrt(), 0.4].into_iter().enumerate() {
             assert!((fit.sigma(i) - sigma).abs() < 1e-12, "{i}: {}", fit.sigma(i));
         }
         assert_eq!(bias.of_effect(&effect), Some(&[-0.4, 0.0][..]));

@@ -180,7 +180,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         );
         let mut with_causes = model.clone();
         if let Some(bias) = bias {
-            bias.widen(&mut with_causes, &self.prior.sigma);
+            bias.widen(&mut with_causes);
             causes.iter_mut().for_each(|cause| widen(cause, &bias));
         }
         Headline {
@@ -202,7 +202,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let (mut refit, weights) = (attribution.refit.clone(), &attribution.nodes[0].weights);
         self.apply_dispersion_factor(&mut refit, weights);
         if let Some(bias) = self.bias_by_horizon(&refit, weights) {
-            bias.widen(&mut refit, &self.prior.sigma);
+            bias.widen(&mut refit);
         }
         refit
     }
