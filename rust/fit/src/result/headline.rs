@@ -181,7 +181,9 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let mut with_causes = model.clone();
         if let Some(bias) = bias {
             bias.widen(&mut with_causes);
-            causes.iter_mut().for_each(|cause| widen(cause, &bias));
+            for cause in &mut causes {
+                widen(cause, &bias);
+            }
         }
         Headline {
             attribution,
