@@ -51,8 +51,8 @@ impl ParameterCovariance {
         }
     }
 
-    /// Covariance of values fitted with the inner products `gram`, with windows in `blocks`, under a prior of the precisions `prior_precision`. A value that changes no
-    /// prediction is taken as uniformly distributed over the width `range`, one per value.
+    /// Covariance of values fitted with the inner products `gram`, with windows in `blocks`, under a prior of the precisions `prior_precision`. A value
+    /// that changes no prediction is taken as uniformly distributed over the width `range`, one per value.
     pub fn new(gram: &Gram, blocks: &[Range<usize>], prior_precision: &[f64], range: &[f64]) -> Self {
         let k = prior_precision.len();
         let precision = |i: usize| gram.total[(i, i)] + prior_precision[i];
