@@ -52,17 +52,23 @@ pub struct Linear<'a, const N: usize> {
     pub moving: Vec<Vec<f64>>,
     /// Standard deviation of the residual torque, N m or N, per joint and grid point.
     pub(super) scatter: Vec<Vec<f64>>,
+    /// Indices of the columns of model errors that act on each joint.
+    acting: Vec<Vec<usize>>,
 }
 
 impl<'a, const N: usize> Linear<'a, N> {
     /// Data of a linear fit of the residual torque, with the first guess of the residual torque's standard deviation.
     pub fn new(residual: &'a Residual<N>) -> Self {
         let moving = |x: &Joint| x.rest.iter().map(|r| (1.0 - r).clamp(0.0, 1.0)).collect();
+        let acting = |x: &Joint| {
+            (0..x.columns.len()).filter(|c| x.columns[*c].iter().any(|value| *value != 0.0)).collect()
+        };
         let first = |x: &Joint| vec![FIRST_SCATTER * x.typical.max(1e-9); residual.t.len()];
         Self {
             residual,
             moving: residual.joints.iter().map(moving).collect(),
             scatter: residual.joints.iter().map(first).collect(),
+            acting: residual.joints.iter().map(acting).collect(),
         }
     }
 
@@ -95,15 +101,19 @@ impl<'a, const N: usize> Linear<'a, N> {
         let rows: Vec<DMatrix<f64>> = (0..N).map(|j| self.rows(j, bells)).collect();
         let weights: Vec<[Vec<f64>; 2]> = (0..N).map(|j| self.weights(j)).collect();
         for j in 0..N {
-            let count = residual.t.len();
-            let columns: Vec<&[f64]> = rows[j].as_slice().chunks_exact(count).collect();
-            let mut weighted = rows[j].clone();
-            for column in weighted.as_mut_slice().chunks_exact_mut(count) {
-                column.iter_mut().zip(&weights[j][1]).for_each(|(x, weight)| *x *= weight);
+            let own = bells.iter().enumerate().filter(|(_, bell)| bell.joint == j).map(|(b, _)| c + b);
+            let acting: Vec<usize> = self.acting[j].iter().copied().chain(own).collect();
+            let columns: Vec<&[f64]> = acting.iter().map(|i| rows[j].column(*i).data.into_slice()).collect();
+            let weighted: Vec<Vec<f64>> = columns.iter().map(|x| times(x, &weights[j][1])).collect();
+            let weighted: Vec<&[f64]> = weighted.iter().map(Vec::as_slice).collect();
+            let parts: Vec<&[f64]> =
+                columns.iter().copied().chain([residual.joints[j].lack.as_slice()]).collect();
+            for (row, i) in cross(&weighted, &parts).chunks_exact(parts.len()).zip(&acting) {
+                for (product, other) in row.iter().zip(&acting) {
+                    normal[(*i, *other)] += product;
+                }
+                right[*i] -= row[acting.len()];
             }
-            let weighted: Vec<&[f64]> = weighted.as_slice().chunks_exact(count).collect();
-            normal += DMatrix::from_column_slice(k, k, &cross(&weighted, &columns));
-            right -= DVector::from_column_slice(&cross(&weighted, &[&residual.joints[j].lack]));
         }
         let inverse = scaled_inverse(&normal)?;
         let values = &inverse * right;
@@ -145,24 +155,24 @@ impl<'a, const N: usize> Linear<'a, N> {
         let (residual, j) = (self.residual, bell.joint);
         let (first, last) = self.reach(bell);
         let shape = bell.over(&residual.t[first..last], residual.step);
-        let weighted = |weights: &Vec<f64>| -> Vec<f64> {
-            shape.iter().zip(&weights[first..last]).map(|(shape, weight)| shape * weight).collect()
-        };
-        let [judged, heeded] = [0, 1].map(|w| weighted(&fitted.weights[j][w]));
-        let columns = &residual.joints[j].columns;
-        let parts: Vec<&[f64]> = columns.iter().chain([&fitted.left[j]]).map(|x| &x[first..last]).collect();
+        let [judged, heeded] = [0, 1].map(|w| times(&shape, &fitted.weights[j][w][first..last]));
+        let (columns, acting) = (&residual.joints[j].columns, &self.acting[j]);
+        let torques = acting.iter().map(|i| &columns[*i]).chain([&fitted.left[j]]);
+        let parts: Vec<&[f64]> = torques.map(|x| &x[first..last]).collect();
         let (c, k) = (columns.len(), columns.len() + fitted.bells.len());
         // Inner products of the pulse with the columns, under the weights for the test of pulses and under those for the fit of model errors.
         let products = cross(&[&judged, &heeded], &parts);
         let mut shared = DMatrix::<f64>::zeros(k, 2);
         for (s, weighted) in [&judged, &heeded].into_iter().enumerate() {
-            shared.column_mut(s).rows_mut(0, c).copy_from_slice(&products[s * (c + 1)..][..c]);
+            for (i, product) in acting.iter().zip(&products[s * parts.len()..]) {
+                shared[(*i, s)] = *product;
+            }
             for (b, other) in fitted.bells.iter().enumerate().filter(|(_, b)| b.joint == j) {
                 let times = residual.t[first..last].iter();
                 shared[(c + b, s)] = -times.zip(weighted).map(|(t, w)| w * other.at(*t)).sum::<f64>();
             }
         }
-        let (along, full) = (products[c], product(&judged, &shape));
+        let (along, full) = (products[acting.len()], product(&judged, &shape));
         let imitated = shared.column(0).dot(&(&fitted.inverse * shared.column(1)));
         let own = (full - imitated).max(0.02 * full).max(1e-300);
         let size = along / own.sqrt() * (MODEL_TIME / JUDGED_TIME).sqrt();
@@ -184,4 +194,9 @@ impl<'a, const N: usize> Linear<'a, N> {
         let to = bell.time + 4.0 * bell.width;
         (t.partition_point(|t| *t < from), t.partition_point(|t| *t <= to))
     }
+}
+
+/// Values times weights.
+fn times(values: &[f64], weights: &[f64]) -> Vec<f64> {
+    values.iter().zip(weights).map(|(value, weight)| value * weight).collect()
 }

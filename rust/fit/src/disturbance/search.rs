@@ -14,8 +14,9 @@ use rayon::prelude::*;
 /// Standard deviations of the Gaussian pulses looked for, after the low-pass, s.
 const PULSE_WIDTHS: [f64; 7] = [0.045, 0.055, 0.07, 0.09, 0.115, 0.145, 0.18];
 
-/// Spacing of the times of pulses tried in the coarse search, s.
-const COARSE: f64 = 0.02;
+/// Spacing of the times of pulses tried in the coarse search, in standard deviations of the pulses: the nearest pulse tried is off by a quarter
+/// of its standard deviation at most and has 98 % of the size.
+const COARSE: f64 = 0.5;
 
 /// Spacing of the times of pulses tried in the fine search, s.
 const FINE: f64 = 0.01;
@@ -44,6 +45,9 @@ const FRICTION_SCATTER: f64 = 0.25;
 
 /// Largest number of pushes looked for in one log; so many are no rare events but something that the arm repeats.
 pub const MAX_PUSHES: usize = 8;
+
+/// Number of pulses tried on a moving joint from which their typical size is taken from them.
+const FEWEST_SIZES: usize = 10;
 
 /// Least time that a joint must move in a log for pushes on it to be looked for, s.
 const MOVES: f64 = 0.5;
@@ -162,9 +166,10 @@ impl<const N: usize> Search<'_, N> {
     /// the typical one.
     fn scan_kind(&self, fitted: &Fitted, joint: usize, width: f64) -> (f64, Option<Bell>) {
         let (from, to) = self.linear.span(width);
-        let count = ((to - from) / COARSE).floor().max(0.0) as usize;
+        let spacing = COARSE * width;
+        let count = ((to - from) / spacing).floor().max(0.0) as usize;
         let tried: Vec<Bell> = (0..count)
-            .map(|i| from + i as f64 * COARSE)
+            .map(|i| from + i as f64 * spacing)
             .map(|time| Bell { joint, time, width, height: 0.0, sigma: 0.0, z: 0.0 })
             .map(|bell| self.linear.weigh(fitted, &bell))
             .collect();
@@ -180,7 +185,7 @@ impl<const N: usize> Search<'_, N> {
         let moves =
             |b: &&Bell| self.linear.moving[joint][t.partition_point(|t| *t < b.time).min(t.len() - 1)] > 0.5;
         let mut sizes: Vec<f64> = tried.iter().filter(moves).map(|b| b.z).collect();
-        if sizes.len() < 20 {
+        if sizes.len() < FEWEST_SIZES {
             return 1.0;
         }
         sizes.sort_by(f64::total_cmp);
