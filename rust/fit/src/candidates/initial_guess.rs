@@ -2,7 +2,8 @@
 
 use crate::candidates::contact_guess::contact_guesses;
 use crate::candidates::periodogram::periodogram_peaks;
-use crate::candidates::screen::{ScoreTest, effect_instances, screen};
+use crate::candidates::screen::{ScoreTest, TestPoint, effect_instances};
+use crate::candidates::traces::Traces;
 use crate::likelihood::context::{DiagnosisContext, SplitWeighting};
 use crate::likelihood::holdout::CONSEQUENTIAL_ERROR;
 use crate::likelihood::holdout::is_plausible;
@@ -12,6 +13,8 @@ use crate::model::hypothesis::{EffectInstance, Hypothesis};
 use crate::progress::Phase;
 use armgap_core::arm::Arm;
 use armgap_core::effect::Trial;
+use rayon::prelude::*;
+use std::sync::Arc;
 
 /// Largest number of candidates that get a full fit at each node of the model search.
 const FULL_FITS: usize = 18;
@@ -31,6 +34,9 @@ const TRACE: f64 = 0.01;
 /// only an effect that explains most of such a gap would be named.
 const TRACE_IN_SMALL: f64 = 0.2;
 
+/// Number of initial guesses of an effect with a threshold on one joint, the best by traces of an earlier node, that are simulated again.
+const SIMULATED_AGAIN: usize = 3;
+
 /// Score tests of all candidates around a fit.
 pub(crate) struct Screening<const N: usize> {
     /// All candidates at their initial guesses, those not in the model first.
@@ -39,6 +45,10 @@ pub(crate) struct Screening<const N: usize> {
     pub(crate) tests: Vec<ScoreTest>,
     /// Jacobian of the predictions on the training windows at the fit.
     pub(crate) jacobian: Sensitivities<N>,
+    /// Traces of the candidates, if kept.
+    pub(crate) traces: Option<Arc<Traces<N>>>,
+    /// Whether all candidates were simulated around this fit.
+    pub(crate) own_traces: bool,
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
@@ -78,13 +88,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     }
 
     /// Largest part of the training windows' cost above the noise floor that a single candidate removes to first order.
-    pub(crate) fn largest_gain(
-        &self,
-        fit: &Fit<P>,
-        weights: &SplitWeighting<N>,
-        screening: &Screening<N>,
-    ) -> f64 {
-        let gains = screening.tests.iter().map(|test| test.gain);
+    pub(crate) fn largest_gain(&self, fit: &Fit<P>, weights: &SplitWeighting<N>, tests: &[ScoreTest]) -> f64 {
+        let gains = tests.iter().map(|test| test.gain);
         let cost: f64 = self.problem(&weights.training).window_costs(&fit.hypothesis).iter().sum();
         gains.fold(0.0, f64::max) / self.above_floor(cost, weights)
     }
@@ -95,16 +100,64 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         (cost - rows * self.floor(weights)).max(1e-9 * cost)
     }
 
-    /// Score tests of all candidates around a fit.
-    pub(crate) fn screened(&self, fit: &Fit<P>, weights: &SplitWeighting<N>) -> Screening<N> {
+    /// Score tests of all candidates around a fit. Effects with a threshold are ranked by the traces `known` of an earlier node, and the best of each
+    /// effect and joint simulated again.
+    pub(crate) fn screened(
+        &self,
+        fit: &Fit<P>,
+        weights: &SplitWeighting<N>,
+        known: Option<&Traces<N>>,
+    ) -> Screening<N> {
+        let candidates = self.candidates_around(fit, weights);
+        self.progress.begin(Phase::Screen, candidates.len());
+        let problem = self.problem(&weights.training);
+        let scale = &weights.training.scale;
+        let jacobian = problem.jacobian(&fit.hypothesis);
+        let point = TestPoint::new(&problem, &fit.hypothesis, &jacobian);
+        let earlier = |c: &EffectInstance| {
+            known.filter(|_| c.law.spec().trial == Trial::Whole).and_then(|known| known.whitened(c, scale))
+        };
+        let trace = |c: &EffectInstance| match earlier(c) {
+            Some(trace) => (trace, true),
+            None => (point.trace(c), false),
+        };
+        let (mut traces, is_earlier): (Vec<Vec<f64>>, Vec<bool>) = candidates.par_iter().map(trace).unzip();
+        let mut tests = point.tests(&candidates, &traces);
+        let again = best_of_places(&tests, &is_earlier);
+        let best: Vec<EffectInstance> = again.iter().map(|i| candidates[*i]).collect();
+        let renewed: Vec<Vec<f64>> = best.par_iter().map(|c| point.trace(c)).collect();
+        let tested = point.tests(&best, &renewed);
+        for ((i, trace), test) in again.into_iter().zip(renewed).zip(tested) {
+            (traces[i], tests[i]) = (trace, test);
+        }
+        let traces = Traces::keep(&candidates, &traces, scale).map(Arc::new);
+        let own_traces = !is_earlier.contains(&true);
+        Screening { candidates, tests, jacobian, traces, own_traces }
+    }
+
+    /// Score tests of all candidates around a fit, by the traces `known` of an earlier node where there are some.
+    pub(crate) fn screened_roughly(
+        &self,
+        fit: &Fit<P>,
+        weights: &SplitWeighting<N>,
+        known: &Traces<N>,
+    ) -> Vec<ScoreTest> {
+        let candidates = self.candidates_around(fit, weights);
+        let problem = self.problem(&weights.training);
+        let jacobian = problem.jacobian(&fit.hypothesis);
+        let point = TestPoint::new(&problem, &fit.hypothesis, &jacobian);
+        let earlier = |c: &EffectInstance| known.whitened(c, &weights.training.scale);
+        let trace = |c: &EffectInstance| earlier(c).unwrap_or_else(|| point.trace(c));
+        let traces: Vec<Vec<f64>> = candidates.par_iter().map(trace).collect();
+        point.tests(&candidates, &traces)
+    }
+
+    /// All candidates that a fit may lack, at their initial guesses, those that do not depend on its residual first.
+    fn candidates_around(&self, fit: &Fit<P>, weights: &SplitWeighting<N>) -> Vec<EffectInstance> {
         let mut all = self.open_candidates(&fit.hypothesis);
         all.extend(self.ripple_guesses(&all, weights, fit));
         all.extend(self.contact_guesses(&all, &fit.hypothesis));
-        self.progress.begin(Phase::Screen, all.len());
-        let problem = self.problem(&weights.training);
-        let jacobian = problem.jacobian(&fit.hypothesis);
-        let tests = screen(&problem, &fit.hypothesis, &jacobian, &all);
-        Screening { candidates: all, tests, jacobian }
+        all
     }
 
     /// Candidate effects that are not yet in `model`, at their initial guesses.
@@ -210,6 +263,20 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     }
 }
 
+/// Indices of the best `SIMULATED_AGAIN` tests of every effect and joint, of those with `of`.
+fn best_of_places(tests: &[ScoreTest], of: &[bool]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..tests.len()).filter(|i| of[*i] && tests[*i].gain > 0.0).collect();
+    order.sort_by(|a, b| tests[*b].gain.total_cmp(&tests[*a].gain));
+    let mut best: Vec<usize> = Vec::new();
+    for i in order {
+        let beside = best.iter().filter(|k| tests[**k].effect.same_place(&tests[i].effect));
+        if beside.count() < SIMULATED_AGAIN {
+            best.push(i);
+        }
+    }
+    best
+}
+
 /// Best initial guesses of the candidates to be fitted: those with the largest gains in the score test, above `least`, and those that the arm's
 /// parameters imitate but for a share of `ABSORBED`, which only the prior of the parameters can distinguish from a change of them.
 fn promising(screened: &[ScoreTest], least: f64) -> Vec<&ScoreTest> {
@@ -227,4 +294,34 @@ fn promising(screened: &[ScoreTest], least: f64) -> Vec<&ScoreTest> {
         }
     }
     chosen
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use armgap_core::effect::find;
+
+    fn test_of(joint: usize, gain: f64) -> ScoreTest {
+        let law = find::<f64>("joint_elasticity").expect("known");
+        ScoreTest {
+            effect: EffectInstance::new(law, joint, [0.0; 3]),
+            gain,
+            estimate: 0.0,
+            sigma: 0.0,
+            information_sigma: 0.0,
+            imitation: Vec::new(),
+            size: 0.0,
+            tested: 0,
+            distinct: 0.0,
+        }
+    }
+
+    #[test]
+    fn the_best_initial_guesses_of_every_effect_and_joint_are_simulated_again() {
+        let gains = [(0, 1.0), (0, 5.0), (0, 3.0), (0, 4.0), (1, 0.5), (1, 0.0), (0, 9.0)];
+        let tests: Vec<ScoreTest> = gains.iter().map(|(joint, gain)| test_of(*joint, *gain)).collect();
+        // The last was simulated at this node already; one with no gain has nothing to show.
+        let of = [true, true, true, true, true, true, false];
+        assert_eq!(best_of_places(&tests, &of), [1, 3, 2, 4]);
+    }
 }

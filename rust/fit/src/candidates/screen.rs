@@ -7,7 +7,6 @@ use crate::likelihood::jacobian::Sensitivities;
 use crate::likelihood::scale::Scales;
 use crate::likelihood::solve::{FitProblem, inverse_of_seen, neutral};
 use crate::model::hypothesis::{EffectInstance, Hypothesis};
-use crate::predict::log_inputs::LogInputs;
 use armgap_core::arm::Arm;
 use armgap_core::effect::{Scope, Trial, catalogue};
 use armgap_core::transmission::Sides;
@@ -119,89 +118,100 @@ pub fn screen<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     jacobian: &Sensitivities<N>,
     candidates: &[EffectInstance],
 ) -> Vec<ScoreTest> {
-    let inputs = jacobian.inputs.as_ref();
-    let (residual, _) = problem.residual_beside(base, inputs);
-    let k = jacobian.columns.len();
-    let before: f64 = student_t_total(problem, &residual);
-    let traced: Vec<(Vec<f64>, Option<f64>)> =
-        candidates.par_iter().map(|c| trace(problem, base, &residual, inputs, before, c)).collect();
-    let (traces, direct): (Vec<Vec<f64>>, Vec<Option<f64>>) = traced.into_iter().unzip();
-    let columns: Vec<&[f64]> = jacobian.columns.iter().chain(&traces).map(Vec::as_slice).collect();
-    let gram = problem.weighting.gram_with(k, problem.data, &columns, &residual);
-    let last = gram.total.nrows() - 1;
-    let mut own = gram.total.view((0, 0), (k, k)).into_owned();
-    let mut own_score = gram.total.column(last).rows(0, k).into_owned();
-    for i in 0..P {
-        let precision = 1.0 / problem.prior.sigma[i].powi(2);
-        own[(i, i)] += precision;
-        own_score[i] += precision * (problem.prior.theta[i] - base.theta[i]);
+    let point = TestPoint::new(problem, base, jacobian);
+    let traces: Vec<Vec<f64>> = candidates.par_iter().map(|candidate| point.trace(candidate)).collect();
+    point.tests(candidates, &traces)
+}
+
+/// A fitted hypothesis around which candidates are tested, with its residual and Jacobian.
+pub(crate) struct TestPoint<'a, A, const N: usize, const P: usize> {
+    problem: &'a FitProblem<'a, A, N, P>,
+    base: &'a Hypothesis<P>,
+    jacobian: &'a Sensitivities<N>,
+    /// Whitened residual of the hypothesis.
+    residual: Vec<f64>,
+}
+
+impl<'a, A: Arm<f64, N, P>, const N: usize, const P: usize> TestPoint<'a, A, N, P> {
+    /// The point of the hypothesis `base`, with its Jacobian.
+    pub(crate) fn new(
+        problem: &'a FitProblem<'a, A, N, P>,
+        base: &'a Hypothesis<P>,
+        jacobian: &'a Sensitivities<N>,
+    ) -> Self {
+        let (residual, _) = problem.residual_beside(base, jacobian.inputs.as_ref());
+        Self { problem, base, jacobian, residual }
     }
-    let inverse = inverse_of_seen(&own).unwrap_or_else(|| DMatrix::zeros(k, k));
-    let score = |(i, effect): (usize, &EffectInstance)| {
-        let c = k + i;
-        let cross: DVector<f64> = gram.total.column(c).rows(0, k).into_owned();
-        let weights = &inverse * &cross;
-        let raw = gram.total[(c, c)];
-        let information = (raw - weights.dot(&cross)).max(1e-12 * raw);
-        let slope = gram.total[(c, last)] - weights.dot(&own_score);
-        let scatter: f64 = gram.scores.iter().map(|s| (s[c] - weights.dot(&s.rows(0, k))).powi(2)).sum();
-        let mut test = scored(effect, raw, information, slope, scatter);
-        test.imitation = weights.iter().map(|w| -w).collect();
-        test.size = test.admissible(effect);
-        if let Some(direct) = direct[i] {
-            test.gain = test.gain.max(direct);
+
+    /// Trace of a candidate: derivative of the whitened prediction by the candidate's tested parameter at its neutral value; for an effect with a
+    /// threshold the whole change of the prediction by the effect instead.
+    pub(crate) fn trace(&self, candidate: &EffectInstance) -> Vec<f64> {
+        let i = tested(candidate);
+        let (moved, step) = match candidate.law.spec().trial {
+            Trial::Amplitudes(_) => {
+                let mut moved = neutral(candidate);
+                let step = TRIAL * (candidate.p[i] - moved.p[i]);
+                moved.p[i] += step;
+                (moved, step)
+            }
+            Trial::Ray => (EffectInstance { p: candidate.p.map(|x| TRIAL * x), ..*candidate }, TRIAL),
+            Trial::Whole | Trial::Disturbance => (*candidate, 1.0),
+        };
+        let inputs = self.jacobian.inputs.as_ref();
+        let (there, _) = self.problem.residual_beside(&self.base.with(moved), inputs);
+        self.problem.progress.unit();
+        self.residual.iter().zip(&there).map(|(here, there)| (here - there) / step).collect()
+    }
+
+    /// Score tests of candidates with the given traces.
+    pub(crate) fn tests(&self, candidates: &[EffectInstance], traces: &[Vec<f64>]) -> Vec<ScoreTest> {
+        let problem = self.problem;
+        let k = self.jacobian.columns.len();
+        let columns: Vec<&[f64]> = self.jacobian.columns.iter().chain(traces).map(Vec::as_slice).collect();
+        let gram = problem.weighting.gram_with(k, problem.data, &columns, &self.residual);
+        let last = gram.total.nrows() - 1;
+        let mut own = gram.total.view((0, 0), (k, k)).into_owned();
+        let mut own_score = gram.total.column(last).rows(0, k).into_owned();
+        for i in 0..P {
+            let precision = 1.0 / problem.prior.sigma[i].powi(2);
+            own[(i, i)] += precision;
+            own_score[i] += precision * (problem.prior.theta[i] - self.base.theta[i]);
         }
-        test
-    };
-    candidates.iter().enumerate().map(score).collect()
+        let inverse = inverse_of_seen(&own).unwrap_or_else(|| DMatrix::zeros(k, k));
+        let before = self.student_t_total(&self.residual);
+        let test = |(i, (effect, trace)): (usize, (&EffectInstance, &Vec<f64>))| {
+            let c = k + i;
+            let cross: DVector<f64> = gram.total.column(c).rows(0, k).into_owned();
+            let weights = &inverse * &cross;
+            let raw = gram.total[(c, c)];
+            let information = (raw - weights.dot(&cross)).max(1e-12 * raw);
+            let slope = gram.total[(c, last)] - weights.dot(&own_score);
+            let scatter: f64 = gram.scores.iter().map(|s| (s[c] - weights.dot(&s.rows(0, k))).powi(2)).sum();
+            let mut test = scored(effect, raw, information, slope, scatter);
+            test.imitation = weights.iter().map(|w| -w).collect();
+            test.size = test.admissible(effect);
+            // An effect with a threshold may act in few windows, whose robust weights are nearly zero until the effect explains their residuals.
+            if effect.law.spec().trial == Trial::Whole {
+                let there: Vec<f64> = self.residual.iter().zip(trace).map(|(here, t)| here - t).collect();
+                test.gain = test.gain.max(before - self.student_t_total(&there));
+            }
+            test
+        };
+        candidates.par_iter().zip(traces).enumerate().map(test).collect()
+    }
+
+    /// Student-t cost of a whitened residual, summed over the windows.
+    fn student_t_total(&self, residual: &[f64]) -> f64 {
+        let weighting = self.problem.weighting;
+        let costs = weighting.costs(self.problem.data, residual);
+        costs.into_iter().map(|cost| weighting.student_t_cost(cost)).sum()
+    }
 }
 
 /// Index of the parameter that the score test displaces: the first amplitude of the candidate whose trial value is not neutral.
 fn tested(candidate: &EffectInstance) -> usize {
     let off = neutral(candidate);
     (0..candidate.len()).find(|&i| candidate.p[i] != off.p[i]).unwrap_or(0)
-}
-
-/// Derivative of the whitened prediction by the candidate's tested parameter at its neutral value; for an effect with a threshold the whole change of
-/// the prediction by the effect instead, with the decrease of the cost.
-fn trace<A: Arm<f64, N, P>, const N: usize, const P: usize>(
-    problem: &FitProblem<A, N, P>,
-    base: &Hypothesis<P>,
-    residual: &[f64],
-    inputs: Option<&LogInputs<N>>,
-    before: f64,
-    candidate: &EffectInstance,
-) -> (Vec<f64>, Option<f64>) {
-    let i = tested(candidate);
-    let (moved, step) = match candidate.law.spec().trial {
-        Trial::Amplitudes(_) => {
-            let mut moved = neutral(candidate);
-            let step = TRIAL * (candidate.p[i] - moved.p[i]);
-            moved.p[i] += step;
-            (moved, step)
-        }
-        Trial::Ray => (EffectInstance { p: candidate.p.map(|x| TRIAL * x), ..*candidate }, TRIAL),
-        Trial::Whole | Trial::Disturbance => (*candidate, 1.0),
-    };
-    let (there, _) = problem.residual_beside(&base.with(moved), inputs);
-    problem.progress.unit();
-    // An effect with a threshold may act in few windows, whose robust weights are nearly zero until the effect explains their residuals.
-    let direct =
-        (candidate.law.spec().trial == Trial::Whole).then(|| before - student_t_total(problem, &there));
-    (residual.iter().zip(&there).map(|(here, there)| (here - there) / step).collect(), direct)
-}
-
-/// Student-t cost of a whitened residual, summed over the windows.
-fn student_t_total<A: Arm<f64, N, P>, const N: usize, const P: usize>(
-    problem: &FitProblem<A, N, P>,
-    residual: &[f64],
-) -> f64 {
-    problem
-        .weighting
-        .costs(problem.data, residual)
-        .into_iter()
-        .map(|c| problem.weighting.student_t_cost(c))
-        .sum()
 }
 
 /// Score test of one candidate from the squared length `raw` of its sensitivity, and information, slope and scatter after projection on the model's

@@ -1,7 +1,7 @@
 //! One node (step) of the model search: candidate effects are screened by score tests, those that pass are fitted in full, and the holdout decides.
 
-use crate::candidates::initial_guess::Screening;
 use crate::candidates::screen::ScoreTest;
+use crate::candidates::traces::Traces;
 use crate::likelihood::context::{DiagnosisContext, SplitWeighting};
 use crate::likelihood::holdout::{CONSEQUENTIAL_ERROR, is_plausible};
 use crate::likelihood::jacobian::Sensitivities;
@@ -14,6 +14,7 @@ use armgap_core::arm::Arm;
 use armgap_core::effect::{MAX_PARAMETERS, Trial, catalogue, find};
 use armgap_core::transmission::Sides;
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// Number of further arrangements of encoder and friction (each on the motor's or the link's side of the transmission) with which the best candidate
 /// is fitted again if its effect is joint elasticity or backlash.
@@ -120,8 +121,10 @@ pub struct SearchNode<const N: usize, const P: usize> {
     /// weights.
     pub field: Vec<(Candidate<P>, f64)>,
     /// Score tests (first-order) of all candidate effects around the model `settled`, those not in the model first; empty if the node's window
-    /// weights were changed after the tests.
+    /// weights were changed after the tests, or the tests used traces of an earlier node.
     pub screened: Vec<ScoreTest>,
+    /// Traces of the candidates in the score tests, for later nodes.
+    pub(crate) traces: Option<Arc<Traces<N>>>,
     /// Weights of the training and holdout windows, common to all candidates.
     pub weights: SplitWeighting<N>,
     /// Cost that measurement noise alone would leave on the holdout, under the node's weights.
@@ -180,28 +183,29 @@ impl<const N: usize, const P: usize> SearchNode<N, P> {
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
     /// The search node around the model `current`, settled from the residual scales `scale`, rad or m; candidates are fitted to a gap only if it is
-    /// larger than `min_relevance` (RMS, relative to the motion within a window).
-    pub fn node(&self, current: &Hypothesis<P>, scale: [f64; N], min_relevance: f64) -> SearchNode<N, P> {
-        self.node_around(self.settle(current, scale), min_relevance)
+    /// larger than `min_relevance` (RMS, relative to the motion within a window); `known` are traces of candidates at an earlier node.
+    pub fn node(
+        &self,
+        current: &Hypothesis<P>,
+        scale: [f64; N],
+        min_relevance: f64,
+        known: Option<&Traces<N>>,
+    ) -> SearchNode<N, P> {
+        self.node_around(self.settle(current, scale), min_relevance, known)
     }
 
     /// The search node around a fit under window weights of its own residual; candidates are fitted to a gap only if it is larger than
-    /// `min_relevance` (RMS, relative to the motion within a window).
-    pub fn node_around(&self, settled: (Fit<P>, SplitWeighting<N>), min_relevance: f64) -> SearchNode<N, P> {
-        self.node_screened(settled, min_relevance, None)
-    }
-
-    /// The search node around a fit as `node_around` gives it, from the score tests `screening` around this fit if they are known.
-    pub(crate) fn node_screened(
+    /// `min_relevance` (RMS, relative to the motion within a window). `known` are traces of candidates at an earlier node.
+    pub fn node_around(
         &self,
         (fit, weights): (Fit<P>, SplitWeighting<N>),
         min_relevance: f64,
-        screening: Option<Screening<N>>,
+        known: Option<&Traces<N>>,
     ) -> SearchNode<N, P> {
         let size = self.relative_gap(&weights, &fit);
         let gap = size > min_relevance;
         let is_wanted = gap || !is_plausible::<P>(fit.prior_cost);
-        let screening = is_wanted.then(|| screening.unwrap_or_else(|| self.screened(&fit, &weights)));
+        let screening = is_wanted.then(|| self.screened(&fit, &weights, known));
         let mut initial_guesses = Vec::new();
         if let Some(screening) = &screening {
             initial_guesses = self.initial_guesses(&fit, &weights, screening, size, min_relevance);
@@ -217,13 +221,15 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let field = self.field(&weights, &fit, &first);
         self.progress.begin(Phase::Finalists, 2 * FINALISTS + MAX_REWEIGHTINGS);
         let final_round = self.final_round(&fit.hypothesis, first, &weights);
-        let tests = screening.map_or_else(Vec::new, |screening| screening.tests);
+        let traces = screening.as_ref().and_then(|screening| screening.traces.clone());
+        let tests = screening.filter(|s| s.own_traces).map_or_else(Vec::new, |screening| screening.tests);
         let screened = if final_round.weights.is_none() { tests } else { Vec::new() };
         let FinalRound { base, candidates, weights: heavier } = final_round;
         let weights = heavier.unwrap_or(weights);
         let floor = self.floor(&weights);
         let motion = self.motion(&weights);
-        self.duel(SearchNode { settled: fit, base, candidates, field, screened, weights, floor, motion })
+        let settled = fit;
+        self.duel(SearchNode { settled, base, candidates, field, screened, traces, weights, floor, motion })
     }
 
     /// Deviation of an effect's first parameter from its neutral value, relative to the largest deviation that a fit allows.

@@ -2,6 +2,7 @@
 //!
 //! After every addition all causes are fitted together again.
 
+use crate::candidates::traces::Traces;
 use crate::likelihood::context::{DiagnosisContext, SplitWeighting};
 use crate::likelihood::encoder_zero::EncoderZeros;
 use crate::likelihood::solve::{Effort, Fit};
@@ -22,6 +23,8 @@ pub struct Attribution<const N: usize, const P: usize> {
     pub model: Fit<P>,
     /// The final model, fitted to the holdout.
     pub on_holdout: Fit<P>,
+    /// Fits to the training logs without one of the final model's effects each, in the order of the effects; empty for a model with one effect.
+    pub without: Vec<Fit<P>>,
     /// Accepted causes, strongest first.
     pub causes: Vec<Cause>,
     /// All search nodes in order, one per step of the search; at the last one nothing was accepted.
@@ -78,8 +81,17 @@ impl<const N: usize, const P: usize> ModelSearch<N, P> {
     fn take_up(&mut self, both: Both<N, P>) -> Fit<P> {
         let fit = both.node.candidates[both.choice].fit.clone();
         self.causes.extend(both.causes);
-        self.nodes.push(std::mem::replace(&mut self.node, both.node));
+        self.move_to(both.node);
         fit
+    }
+
+    /// Moves the search on to `node`. Of the nodes before it only the first keeps its traces, for a restart.
+    fn move_to(&mut self, node: SearchNode<N, P>) {
+        let mut before = std::mem::replace(&mut self.node, node);
+        if !self.nodes.is_empty() {
+            before.traces = None;
+        }
+        self.nodes.push(before);
     }
 }
 
@@ -114,11 +126,11 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         }
         let ModelSearch { mut causes, mut nodes, node, .. } = search;
         let mut model = node.settled.clone();
-        self.prune(&mut model, &mut causes, &node);
+        let without = self.prune(&mut model, &mut causes, &node);
         let on_holdout = self.apply_dispersion_factor(&mut model, &node.weights);
         nodes.push(node);
         refresh(&model, &mut causes);
-        Attribution { refit, model, on_holdout, causes, nodes }
+        Attribution { refit, model, on_holdout, without, causes, nodes }
     }
 
     /// The first search node, around the arm with its parameters re-estimated, with or without encoder zeros that differ between recordings.
@@ -131,22 +143,22 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         start: &Hypothesis<P>,
         scale: [f64; N],
     ) -> ((Fit<P>, SplitWeighting<N>), SearchNode<N, P>) {
-        let with_zeros = || {
+        let with_zeros = |known: Option<&Traces<N>>| {
             let settled = self.settle(start, scale);
-            (settled.clone(), self.node_around(settled, RELEVANT))
+            (settled.clone(), self.node_around(settled, RELEVANT, known))
         };
         if !EncoderZeros::can_be_told_from(&self.training.data) {
-            return with_zeros();
+            return with_zeros(None);
         }
         let settled = self.settle_without_zeros(start, scale);
-        let node = self.node_around(settled.clone(), RELEVANT);
+        let node = self.node_around(settled.clone(), RELEVANT, None);
         let explained = self.cost_with_zeros(&settled.0, &settled.1.training);
         let least = node.field.iter().map(|(candidate, _)| candidate.training.iter().sum::<f64>());
         let is_cause = choose(&node, false, min_relevance(node.relative_error())).is_some();
         if is_cause && least.fold(f64::INFINITY, f64::min) < explained {
             (settled, node)
         } else {
-            with_zeros()
+            with_zeros(node.traces.as_deref())
         }
     }
 
@@ -234,8 +246,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     /// Moves a search on to the node around the fit `next`.
     pub(crate) fn advance(&self, search: &mut ModelSearch<N, P>, next: &Fit<P>, min_relevance: f64) {
         let settled = self.settle(&next.hypothesis, search.node.weights.training.scale);
-        let node = self.node_around(settled.clone(), min_relevance);
-        search.nodes.push(std::mem::replace(&mut search.node, node));
+        let node = self.node_around(settled.clone(), min_relevance, search.node.traces.as_deref());
+        search.move_to(node);
         search.threshold = self.look_closer(&mut search.node, settled, min_relevance, UNEXPLAINED);
     }
 
@@ -251,13 +263,19 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         if !(FAINTEST..=min_relevance).contains(&node.relative_error()) || node.excess() <= clear {
             return min_relevance;
         }
-        *node = self.node_around(settled, FAINTEST);
+        *node = self.node_around(settled, FAINTEST, node.traces.as_deref());
         FAINTEST
     }
 
-    /// Drops causes that the other causes, or regularised friction, have made idle.
-    pub(crate) fn prune(&self, model: &mut Fit<P>, causes: &mut Vec<Cause>, node: &SearchNode<N, P>) {
-        let mut i = 0;
+    /// Drops causes that the other causes, or regularised friction, have made idle; returns the fits without each of the others, as far as they were
+    /// needed.
+    pub(crate) fn prune(
+        &self,
+        model: &mut Fit<P>,
+        causes: &mut Vec<Cause>,
+        node: &SearchNode<N, P>,
+    ) -> Vec<Fit<P>> {
+        let (mut i, mut kept) = (0, Vec::new());
         while (causes.len() > 1 || model.hypothesis.is_rounded()) && i < causes.len() {
             let full = self.judged(node, model.clone(), None);
             let mut without = model.hypothesis.clone();
@@ -270,11 +288,13 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             if idle {
                 *model = reduced.fit;
                 causes.remove(i);
-                i = 0;
+                (i, kept) = (0, Vec::new());
             } else {
+                kept.push(reduced.fit);
                 i += 1;
             }
         }
+        kept
     }
 
     /// A fit as a candidate with the costs of all windows under the weights of `node`, for comparison with other fits.

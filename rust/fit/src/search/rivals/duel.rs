@@ -33,9 +33,10 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             || self.fit_candidates(&weights, current, initial_guesses, Effort::FULL, None),
             || self.candidate(&weights, current, current.effects.len(), Effort::FULL, None),
         );
-        let (settled, field) = (node.settled.clone(), node.field.clone());
+        let (settled, field, traces) = (node.settled.clone(), node.field.clone(), node.traces.clone());
         let (floor, motion) = (self.floor(&weights), self.motion(&weights));
-        SearchNode { settled, base, candidates, field, screened: Vec::new(), weights, floor, motion }
+        let screened = Vec::new();
+        SearchNode { settled, base, candidates, field, screened, traces, weights, floor, motion }
     }
 }
 
