@@ -100,7 +100,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         (cost - rows * self.floor(weights)).max(1e-9 * cost)
     }
 
-    /// Score tests of all candidates around a fit. Effects with a threshold are ranked by the traces `known` of an earlier node, and the best of each
+    /// Score tests of all candidates around a fit. Effects with a threshold are ranked by the traces `known` of earlier nodes, and the best of each
     /// effect and joint simulated again.
     pub(crate) fn screened(
         &self,
@@ -114,6 +114,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let scale = &weights.training.scale;
         let jacobian = problem.jacobian(&fit.hypothesis);
         let point = TestPoint::new(&problem, &fit.hypothesis, &jacobian);
+        let known = known.filter(|known| known.hold_beside(&fit.hypothesis));
         let earlier = |c: &EffectInstance| {
             known.filter(|_| c.law.spec().trial == Trial::Whole).and_then(|known| known.whitened(c, scale))
         };
@@ -127,10 +128,14 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let best: Vec<EffectInstance> = again.iter().map(|i| candidates[*i]).collect();
         let renewed: Vec<Vec<f64>> = best.par_iter().map(|c| point.trace(c)).collect();
         let tested = point.tests(&best, &renewed);
+        // Initial guesses that are not simulated again lose to those that are.
+        for (test, _) in tests.iter_mut().zip(&is_earlier).filter(|(_, earlier)| **earlier) {
+            test.gain = 0.0;
+        }
         for ((i, trace), test) in again.into_iter().zip(renewed).zip(tested) {
             (traces[i], tests[i]) = (trace, test);
         }
-        let traces = Traces::keep(&candidates, &traces, scale).map(Arc::new);
+        let traces = Traces::keep(&fit.hypothesis, &candidates, &traces, scale).map(Arc::new);
         let own_traces = !is_earlier.contains(&true);
         Screening { candidates, tests, jacobian, traces, own_traces }
     }
@@ -146,7 +151,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let problem = self.problem(&weights.training);
         let jacobian = problem.jacobian(&fit.hypothesis);
         let point = TestPoint::new(&problem, &fit.hypothesis, &jacobian);
-        let earlier = |c: &EffectInstance| known.whitened(c, &weights.training.scale);
+        let known = Some(known).filter(|known| known.hold_beside(&fit.hypothesis));
+        let earlier = |c: &EffectInstance| known.and_then(|k| k.whitened(c, &weights.training.scale));
         let trace = |c: &EffectInstance| earlier(c).unwrap_or_else(|| point.trace(c));
         let traces: Vec<Vec<f64>> = candidates.par_iter().map(trace).collect();
         point.tests(&candidates, &traces)

@@ -200,3 +200,35 @@ impl<'a, const N: usize> Linear<'a, N> {
 fn times(values: &[f64], weights: &[f64]) -> Vec<f64> {
     values.iter().zip(weights).map(|(value, weight)| value * weight).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_that_act_on_one_joint_are_fitted_to_it() {
+        let t: Vec<f64> = (0..500).map(|i| 0.01 * f64::from(i)).collect();
+        let wave = |rate: f64| -> Vec<f64> { t.iter().map(|t| (rate * t).sin()).collect() };
+        let zero = vec![0.0; t.len()];
+        // The first column acts on the first joint, the second on the second, the third on both.
+        let columns = [vec![wave(2.0), zero.clone(), wave(5.0)], vec![zero.clone(), wave(3.0), wave(7.0)]];
+        let sizes = [0.7, -0.4, 0.2];
+        let joint = |columns: Vec<Vec<f64>>| {
+            let lack = (0..t.len()).map(|i| columns.iter().zip(sizes).map(|(c, size)| -size * c[i]).sum());
+            Joint { lack: lack.collect(), columns, rest: zero.clone(), holding: 0.0, typical: 1.0 }
+        };
+        let residual = Residual {
+            step: 0.01,
+            joints: columns.map(joint),
+            prior: vec![(0.0, 1e3); 3],
+            activity: vec![vec![1.0; t.len()]],
+            t: t.clone(),
+        };
+        let linear = Linear::new(&residual);
+        assert_eq!(linear.acting, [[0, 2], [1, 2]]);
+        let fitted = linear.fit(&[]).expect("regular");
+        assert!(fitted.left.iter().flatten().all(|left| left.abs() < 1e-6));
+        let pulse = Bell { joint: 1, time: 2.5, width: 0.09, height: 0.0, sigma: 0.0, z: 0.0 };
+        assert!(linear.weigh(&fitted, &pulse).height.abs() < 1e-5);
+    }
+}

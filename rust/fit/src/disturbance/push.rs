@@ -129,7 +129,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             return Conclusion::without(alone);
         }
         self.set_pushes(&disturbances);
-        let beside = self.attribute(max_causes, seed, law);
+        let mut beside = self.attribute(max_causes, seed, law);
         let harmful = beside.error() > MUCH_WORSE * alone.error();
         if harmful {
             disturbances.clear();
@@ -140,6 +140,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         if disturbances.is_empty() {
             return Conclusion::without(alone);
         }
+        // These fits were made beside the first pushes.
+        beside.without.clear();
         // A push is less probable where the gap that it was to explain remains, not where the arm lacks effects besides.
         let belief = belief_beside(left_beside(&alone.nodes, &beside.nodes), REMAINDER_DOUBT);
         for disturbance in &mut disturbances {

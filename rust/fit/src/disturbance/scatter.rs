@@ -14,8 +14,9 @@ const FREEDOM: f64 = 5.0;
 /// speeds and torques).
 const UPDATES: usize = 60;
 
-/// Change of the variance of typical motion by an update, relative to the variance, below which the updates end.
-const VARIANCE_SETTLED: f64 = 2e-3;
+/// Change of the mean variance by an update, relative to the variance, below which the updates end. Ten times as much leaves some pulses a tenth of a
+/// deviation off.
+const VARIANCE_SETTLED: f64 = 2e-4;
 
 /// Smallest standard deviation of the residual torque that the activity of the motion may give, relative to the typical one.
 const QUIET: f64 = 0.5;

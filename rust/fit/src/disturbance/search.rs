@@ -46,8 +46,8 @@ const FRICTION_SCATTER: f64 = 0.25;
 /// Largest number of pushes looked for in one log; so many are no rare events but something that the arm repeats.
 pub const MAX_PUSHES: usize = 8;
 
-/// Number of pulses tried on a moving joint from which their typical size is taken from them.
-const FEWEST_SIZES: usize = 10;
+/// Time in motion of a joint from which the typical size of its chance pulses is estimated, s.
+const TYPICAL_OVER: f64 = 0.4;
 
 /// Least time that a joint must move in a log for pushes on it to be looked for, s.
 const MOVES: f64 = 0.5;
@@ -168,24 +168,25 @@ impl<const N: usize> Search<'_, N> {
         let (from, to) = self.linear.span(width);
         let spacing = COARSE * width;
         let count = ((to - from) / spacing).floor().max(0.0) as usize;
-        let tried: Vec<Bell> = (0..count)
+        let tried: Vec<Bell> = (0..=count)
             .map(|i| from + i as f64 * spacing)
             .map(|time| Bell { joint, time, width, height: 0.0, sigma: 0.0, z: 0.0 })
             .map(|bell| self.linear.weigh(fitted, &bell))
             .collect();
-        let chance = self.typical(joint, &tried);
+        let chance = self.typical(joint, &tried, spacing);
         let apart = |b: &Bell| fitted.bells.iter().all(|o| !b.touches(o));
         let best = tried.into_iter().filter(apart).max_by(|a, b| a.z.total_cmp(&b.z));
         (chance, best.map(|best| Bell { z: best.z / chance, ..best }))
     }
 
-    /// Typical size, in standard deviations, of chance pulses of one width while the joint moves; at least one.
-    fn typical(&self, joint: usize, tried: &[Bell]) -> f64 {
+    /// Typical size, in standard deviations, of chance pulses of one width while the joint moves, from pulses tried `spacing` seconds apart; at least
+    /// one.
+    fn typical(&self, joint: usize, tried: &[Bell], spacing: f64) -> f64 {
         let t = &self.linear.residual.t;
         let moves =
             |b: &&Bell| self.linear.moving[joint][t.partition_point(|t| *t < b.time).min(t.len() - 1)] > 0.5;
         let mut sizes: Vec<f64> = tried.iter().filter(moves).map(|b| b.z).collect();
-        if sizes.len() < FEWEST_SIZES {
+        if (sizes.len() as f64) * spacing < TYPICAL_OVER {
             return 1.0;
         }
         sizes.sort_by(f64::total_cmp);
@@ -279,6 +280,14 @@ mod tests {
             let found = times(&residual(0.05, &pulses), remainder);
             assert_eq!(found.len(), 3, "{found:?}");
             assert!(found.iter().zip(&pulses).all(|(t, (time, _))| (t - time).abs() < 0.05), "{found:?}");
+        }
+    }
+
+    #[test]
+    fn a_push_next_to_an_end_of_the_log_is_found() {
+        for time in [0.2, 9.79] {
+            let found = times(&residual(0.05, &[(time, 0.8)]), false);
+            assert!(found.len() == 1 && (found[0] - time).abs() < 0.05, "{found:?} for {time}");
         }
     }
 

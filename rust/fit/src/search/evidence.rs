@@ -42,7 +42,7 @@ const GAIN_POWER: f64 = 0.5;
 const RIVAL_POWER: i32 = 4;
 
 /// Exponent, in the odds of a cause, of the share of the mean square gap that all causes together explain. At 1 the log loss on arms of another simulator
-/// is smaller by a tenth, but names that are right on a real arm, whose causes explain a third of the gap over a short horizon, fall below a half
+/// is smaller by a tenth, but names that are right on a real arm, which leave two thirds of the RMS gap over short horizons, come close to a half
 /// (docs/decisions/034-probability-of-a-cause.md).
 const EXPLAINED_POWER: f64 = 0.5;
 
@@ -69,7 +69,8 @@ pub struct Evidence {
     /// Standard deviation of the size ratio.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_ratio_sigma: Option<f64>,
-    /// Share, 0 to 1, of the mean square gap that all causes together explain, all cost above the noise floor; none where no more than noise remains.
+    /// Share, 0 to 1, of the holdout's mean square gap, as the re-estimated arm leaves it, that the final model explains; none where no more than noise
+    /// remains.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub explained: Option<f64>,
     /// Odds that the encoder zeros of the recordings have a common mean that is not zero, against a scatter around zero; only for an offset of the
@@ -143,7 +144,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
                 let rises = differences(&per_window(&without), &per_window(model));
                 let bare = full + rises.iter().sum::<f64>();
                 cause.evidence.gain = Some((bare - full) / rest);
-                cause.evidence.explained = Some(explained);
+                cause.evidence.explained = (!judged_in_training).then_some(explained);
                 cause.evidence.gain_sigma = Some(standard_error_of_sum(&rises) / rest);
                 if is_plausible::<P>(without.prior_cost) {
                     // The other effects in the model keep the parameters plausible without this cause: only predicted motion can be evidence for it.

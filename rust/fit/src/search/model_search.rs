@@ -23,7 +23,8 @@ pub struct Attribution<const N: usize, const P: usize> {
     pub model: Fit<P>,
     /// The final model, fitted to the holdout.
     pub on_holdout: Fit<P>,
-    /// Fits to the training logs without one of the final model's effects each, in the order of the effects; empty for a model with one effect.
+    /// Fits to the training logs without one of the final model's effects each, in the order of the effects, as
+    /// far as pruning made them; those after the last are unknown.
     pub without: Vec<Fit<P>>,
     /// Accepted causes, strongest first.
     pub causes: Vec<Cause>,
@@ -127,8 +128,9 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let ModelSearch { mut causes, mut nodes, node, .. } = search;
         let mut model = node.settled.clone();
         let without = self.prune(&mut model, &mut causes, &node);
+        nodes.iter_mut().for_each(|node| node.traces = None);
         let on_holdout = self.apply_dispersion_factor(&mut model, &node.weights);
-        nodes.push(node);
+        nodes.push(SearchNode { traces: None, ..node });
         refresh(&model, &mut causes);
         Attribution { refit, model, on_holdout, without, causes, nodes }
     }

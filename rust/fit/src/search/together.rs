@@ -4,7 +4,6 @@
 //! the other one dominates the windows' costs. So before a search ends with an open gap, each of the best candidates is accepted on trial: if a
 //! second effect then closes nearly all of the gap, and neither of the two can be spared, both are causes.
 
-use crate::candidates::traces::Traces;
 use crate::likelihood::context::DiagnosisContext;
 use crate::likelihood::solve::Effort;
 use crate::model::hypothesis::EffectInstance;
@@ -12,7 +11,6 @@ use crate::search::acceptance::{CERTAIN, Ground, best, brings_back, choose, is_p
 use crate::search::attribute::{Candidate, SearchNode};
 use crate::search::belief::{Cause, name};
 use armgap_core::arm::Arm;
-use std::sync::Arc;
 
 /// Share of the gap above the noise floor that two effects must explain to be accepted together.
 const NEARLY_ALL: f64 = 0.85;
@@ -78,14 +76,15 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let (fit, weights) = self.settle(&first.fit.hypothesis, alone.weights.training.scale);
         // Share of the gap left by `first` that a second effect must remove for the two to remove `NEARLY_ALL` of the whole gap.
         let needed = 1.0 - (1.0 - NEARLY_ALL) / (1.0 - alone.share(first)).max(1e-9);
-        let promised = |known: &Arc<Traces<N>>| {
-            self.largest_gain(&fit, &weights, &self.screened_roughly(&fit, &weights, known))
+        let known = alone.traces.as_deref();
+        let tests = match known {
+            Some(known) => self.screened_roughly(&fit, &weights, known),
+            None => self.screened(&fit, &weights, None).tests,
         };
-        let known = alone.traces.as_ref();
-        if known.is_some_and(|known| promised(known) < PROMISED_DECREASE * needed) {
+        if self.largest_gain(&fit, &weights, &tests) < PROMISED_DECREASE * needed {
             return None;
         }
-        let node = self.node_around((fit, weights), min_relevance, known.map(Arc::as_ref));
+        let node = self.node_around((fit, weights), min_relevance, known);
         let (choice, ground) = choose(&node, true, min_relevance)?;
         let pair = &node.candidates[choice];
         let none = &alone.settled.hypothesis;
