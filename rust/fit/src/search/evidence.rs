@@ -12,7 +12,7 @@ use crate::likelihood::solve::{Fit, neutral};
 use crate::model::hypothesis::EffectInstance;
 use crate::search::acceptance::{ABOVE_FLOOR, Ground, UNEXPLAINED};
 use crate::search::attribute::SearchNode;
-use crate::search::belief::left_over;
+use crate::search::belief::error_explained;
 use crate::search::model_search::Attribution;
 use armgap_core::arm::Arm;
 use armgap_core::effect::Trial;
@@ -69,8 +69,8 @@ pub struct Evidence {
     /// Standard deviation of the size ratio.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_ratio_sigma: Option<f64>,
-    /// Share, 0 to 1, of the holdout's mean square gap, as the re-estimated arm leaves it, that the final model explains; none where no more than noise
-    /// remains.
+    /// Share, 0 to 1, of the mean square prediction error of the re-estimated arm on the holdout, of windows but the worst few, that the final model
+    /// explains; none where no more than noise remains.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub explained: Option<f64>,
     /// Odds that the encoder zeros of the recordings have a common mean that is not zero, against a scatter around zero; only for an offset of the
@@ -117,7 +117,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         if attribution.causes.is_empty() {
             return;
         }
-        let explained = 1.0 - left_over(&attribution.nodes);
+        let explained = error_explained(&attribution.nodes);
         let Attribution { model, on_holdout, without, causes, .. } = attribution;
         let (model, on_holdout, reduced) = (&*model, &*on_holdout, &*without);
         let held_out = |fit: &Fit<P>| self.judged_on_holdout(&last.weights, fit).0;
