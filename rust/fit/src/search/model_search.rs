@@ -128,7 +128,9 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let ModelSearch { mut causes, mut nodes, node, .. } = search;
         let mut model = node.settled.clone();
         let without = self.prune(&mut model, &mut causes, &node);
-        nodes.iter_mut().for_each(|node| node.traces = None);
+        for earlier in &mut nodes {
+            earlier.traces = None;
+        }
         let on_holdout = self.apply_dispersion_factor(&mut model, &node.weights);
         nodes.push(SearchNode { traces: None, ..node });
         refresh(&model, &mut causes);
