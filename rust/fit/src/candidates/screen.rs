@@ -170,13 +170,7 @@ impl<'a, A: Arm<f64, N, P>, const N: usize, const P: usize> TestPoint<'a, A, N, 
         let columns: Vec<&[f64]> = self.jacobian.columns.iter().chain(traces).map(Vec::as_slice).collect();
         let gram = problem.weighting.gram_with(k, problem.data, &columns, &self.residual);
         let last = gram.total.nrows() - 1;
-        let mut own = gram.total.view((0, 0), (k, k)).into_owned();
-        let mut own_score = gram.total.column(last).rows(0, k).into_owned();
-        for i in 0..P {
-            let precision = 1.0 / problem.prior.sigma[i].powi(2);
-            own[(i, i)] += precision;
-            own_score[i] += precision * (problem.prior.theta[i] - self.base.theta[i]);
-        }
+        let (own, own_score) = problem.normal_equations(&gram, k, self.base);
         let inverse = inverse_of_seen(&own).unwrap_or_else(|| DMatrix::zeros(k, k));
         let before = self.student_t_total(&self.residual);
         let test = |(i, (effect, trace)): (usize, (&EffectInstance, &Vec<f64>))| {

@@ -10,13 +10,8 @@ use crate::log::track::median;
 /// Degrees of freedom of the Student distribution assumed for the residual torque.
 const FREEDOM: f64 = 5.0;
 
-/// Largest number of multiplicative updates in the fit of the residual torque's variance to the motion's activities (squares of accelerations,
-/// speeds and torques).
+/// Number of multiplicative updates in the fit of the residual torque's variance to the motion's activities (squared accelerations, speeds, torques).
 const UPDATES: usize = 60;
-
-/// Change of the mean variance by an update, relative to the variance, below which the updates end. Ten times as much leaves some pulses a tenth of a
-/// deviation off.
-const VARIANCE_SETTLED: f64 = 2e-4;
 
 /// Smallest standard deviation of the residual torque that the activity of the motion may give, relative to the typical one.
 const QUIET: f64 = 0.5;
@@ -71,9 +66,6 @@ fn by_activity<const N: usize>(
     let sum = |a: &[f64], at: &[f64]| a.iter().zip(at).map(|(a, f)| a * f).sum::<f64>().max(least);
     let rows: Vec<usize> = (0..left.len()).filter(|&i| moves[i]).collect();
     let flat: Vec<f64> = rows.iter().flat_map(|&i| features.iter().map(move |f| f[i])).collect();
-    let mean: Vec<f64> = (0..features.len())
-        .map(|k| flat.iter().skip(k).step_by(features.len()).sum::<f64>() / rows.len().max(1) as f64)
-        .collect();
     let mut a = vec![typical * typical / features.len() as f64; features.len()];
     for _ in 0..UPDATES {
         let (mut up, mut down) = (vec![0.0; a.len()], vec![1e-300; a.len()]);
@@ -86,14 +78,8 @@ fn by_activity<const N: usize>(
                 *down += feature * precision;
             }
         }
-        let mut change = 0.0;
         for k in 0..a.len() {
-            let next = (a[k] * (up[k] / down[k]).sqrt()).max(1e-8 * typical * typical);
-            change += (next - a[k]).abs() * mean[k];
-            a[k] = next;
-        }
-        if change < VARIANCE_SETTLED * sum(&a, &mean) {
-            break;
+            a[k] = (a[k] * (up[k] / down[k]).sqrt()).max(1e-8 * typical * typical);
         }
     }
     let variance = |i: usize| a.iter().zip(&features).map(|(a, f)| a * f[i]).sum::<f64>().max(least);

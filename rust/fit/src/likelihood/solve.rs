@@ -222,7 +222,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> FitProblem<'_, A, N, P> 
         let mut damping = 1e-4;
         let mut jacobian = Jacobian::reusing(self, &at, known);
         'search: for _ in 0..effort.iterations {
-            let (normal, gradient) = self.normal_equations(&jacobian.gram, &at.hypothesis);
+            let (normal, gradient) =
+                self.normal_equations(&jacobian.gram, at.hypothesis.values().len(), &at.hypothesis);
             let now = at.hypothesis.values();
             let mut fall = None;
             for _ in 0..6 {
@@ -281,19 +282,24 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> FitProblem<'_, A, N, P> 
     pub(crate) fn cost_refitted(&self, hypothesis: &Hypothesis<P>, jacobian: &Sensitivities<N>) -> f64 {
         let (residual, _) = self.residual_beside(hypothesis, jacobian.inputs.as_ref());
         let gram = jacobian.gram_with(self, &residual);
-        let (normal, gradient) = self.normal_equations(&gram, hypothesis);
-        let k = gradient.len();
+        let k = gram.total.nrows() - 1;
+        let (normal, gradient) = self.normal_equations(&gram, k, hypothesis);
         let as_it_is = gram.total[(k, k)] + self.prior.cost(&hypothesis.theta);
         let fall = inverse_of_seen(&normal).map_or(0.0, |inverse| gradient.dot(&(inverse * &gradient)));
         let cost = as_it_is - fall;
         if cost.is_finite() { cost } else { f64::INFINITY }
     }
 
-    /// Normal matrix and right-hand side of a Gauss-Newton step, with the prior.
-    fn normal_equations(&self, gram: &Gram, hypothesis: &Hypothesis<P>) -> (DMatrix<f64>, DVector<f64>) {
-        let k = gram.total.nrows() - 1;
+    /// Normal matrix and right-hand side of a Gauss-Newton step over the free values, whose columns are the first `k` of `gram`, with the prior.
+    pub(crate) fn normal_equations(
+        &self,
+        gram: &Gram,
+        k: usize,
+        hypothesis: &Hypothesis<P>,
+    ) -> (DMatrix<f64>, DVector<f64>) {
+        let residual = gram.total.ncols() - 1;
         let mut normal = gram.total.view((0, 0), (k, k)).into_owned();
-        let mut gradient = gram.total.column(k).rows(0, k).into_owned();
+        let mut gradient = gram.total.column(residual).rows(0, k).into_owned();
         for i in 0..P {
             let precision = 1.0 / self.prior.sigma[i].powi(2);
             normal[(i, i)] += precision;

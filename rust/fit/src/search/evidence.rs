@@ -42,7 +42,7 @@ const GAIN_POWER: f64 = 0.5;
 const RIVAL_POWER: i32 = 4;
 
 /// Exponent, in the odds of a cause, of the share of the mean square gap that all causes together explain. At 1 the log loss on arms of another simulator
-/// is smaller by a tenth, but names that are right on a real arm, which leave two thirds of the RMS gap over short horizons, come close to a half
+/// is smaller by a tenth, but names that are right on a real arm, which leave three quarters of the RMS gap over short horizons, fall to 0.6
 /// (docs/decisions/034-probability-of-a-cause.md).
 const EXPLAINED_POWER: f64 = 0.5;
 
