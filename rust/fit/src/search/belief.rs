@@ -148,18 +148,6 @@ pub fn left_over<const N: usize, const P: usize>(nodes: &[SearchNode<N, P>]) -> 
     unexplained_of(nodes.first(), nodes.last())
 }
 
-/// Share, 0 to 1, of the mean square prediction error on the holdout at the first node of a model search, of windows but the worst few, that is gone at
-/// the last.
-pub fn error_explained<const N: usize, const P: usize>(nodes: &[SearchNode<N, P>]) -> f64 {
-    let error = |node: Option<&SearchNode<N, P>>| node.map_or(0.0, SearchNode::relative_error);
-    explained_share(error(nodes.first()), error(nodes.last()))
-}
-
-/// Share, 0 to 1, of the square of an RMS error `before` that is gone where the error is `after`.
-fn explained_share(before: f64, after: f64) -> f64 {
-    if before > 0.0 { (1.0 - (after / before).powi(2)).max(0.0) } else { 1.0 }
-}
-
 /// Share, 0 to 1, of the gap remaining at the end of a first model search that remains at the end of a second one.
 pub fn left_beside<const N: usize, const P: usize>(
     first: &[SearchNode<N, P>],
@@ -193,17 +181,4 @@ fn left_of<const N: usize, const P: usize>(earlier: &SearchNode<N, P>, last: &Se
 /// Factor on a probability where the share `left` of the gap remains unexplained: one if nothing remains, `least` if all of the gap does.
 pub fn belief_beside(left: f64, least: f64) -> f64 {
     least + (1.0 - least) * (1.0 - left).powi(REMAINDER_POWER)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn an_error_that_falls_to_a_half_is_explained_by_three_quarters() {
-        assert_eq!(
-            [(2.0, 1.0), (2.0, 0.0), (2.0, 3.0), (0.0, 0.0)].map(|(b, a)| explained_share(b, a)),
-            [0.75, 1.0, 0.0, 1.0]
-        );
-    }
 }

@@ -2,9 +2,9 @@
 //!
 //! A real arm always has effects that the library does not have, so an unexplained remainder of the gap is no evidence against a cause by itself.
 //! What counts is how the part of the gap that the cause explains compares with the remainder: an effect that is not in the arm takes up a part of
-//! the remainder, and another part under another motion. So the probability follows from how often the cause is chosen when the windows are drawn
-//! again, by how much the holdout's error rises without it, whether fits to the holdout and to the training logs give it the same size, and how much
-//! of the whole gap all causes together explain: where most of it stays, the effect that makes it is not in the library, and imitations of it are.
+//! the remainder, and another part under another motion. So the probability follows from three figures: how often the cause is chosen when the
+//! windows are drawn again, by how much the holdout's error rises without it, and whether fits to the holdout and to the training logs give it the
+//! same size.
 
 use crate::likelihood::context::DiagnosisContext;
 use crate::likelihood::holdout::is_plausible;
@@ -12,7 +12,6 @@ use crate::likelihood::solve::{Fit, neutral};
 use crate::model::hypothesis::EffectInstance;
 use crate::search::acceptance::{ABOVE_FLOOR, Ground, UNEXPLAINED};
 use crate::search::attribute::SearchNode;
-use crate::search::belief::error_explained;
 use crate::search::model_search::Attribution;
 use armgap_core::arm::Arm;
 use armgap_core::effect::Trial;
@@ -41,11 +40,6 @@ const GAIN_POWER: f64 = 0.5;
 /// by the cause; fitted as `PRIOR_ODDS` is. At 1 the log loss is larger by a fifth, at 3 by a hundredth.
 const RIVAL_POWER: i32 = 4;
 
-/// Exponent, in the odds of a cause, of the share of the mean square gap that all causes together explain. At 1 the log loss on arms of another simulator
-/// is smaller by a tenth, but names that are right on a real arm, which leave three quarters of the RMS gap over short horizons, fall to 0.6
-/// (docs/decisions/034-probability-of-a-cause.md).
-const EXPLAINED_POWER: f64 = 0.5;
-
 /// Evidence for a cause in the final model.
 #[derive(Debug, Clone, Copy, Default, JsonSchema, Serialize)]
 pub struct Evidence {
@@ -69,10 +63,6 @@ pub struct Evidence {
     /// Standard deviation of the size ratio.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_ratio_sigma: Option<f64>,
-    /// Share, 0 to 1, of the mean square prediction error of the re-estimated arm on the holdout, of windows but the worst few, that the final model
-    /// explains; none where no more than noise remains.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub explained: Option<f64>,
     /// Odds that the encoder zeros of the recordings have a common mean that is not zero, against a scatter around zero; only for an offset of the
     /// encoder's zero and effects that are equivalent to it, and `None` where all recordings have the same zero.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -87,8 +77,7 @@ impl Evidence {
         let odds = PRIOR_ODDS
             * gain.max(0.0).powf(GAIN_POWER)
             * self.agreement()
-            * self.left_by_rival().powi(RIVAL_POWER)
-            * self.explained.unwrap_or(1.0).powf(EXPLAINED_POWER);
+            * self.left_by_rival().powi(RIVAL_POWER);
         beyond * self.selected * odds / (1.0 + odds)
     }
 
@@ -117,7 +106,6 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         if attribution.causes.is_empty() {
             return;
         }
-        let explained = error_explained(&attribution.nodes);
         let Attribution { model, on_holdout, without, causes, .. } = attribution;
         let (model, on_holdout, reduced) = (&*model, &*on_holdout, &*without);
         let held_out = |fit: &Fit<P>| self.judged_on_holdout(&last.weights, fit).0;
@@ -144,7 +132,6 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
                 let rises = differences(&per_window(&without), &per_window(model));
                 let bare = full + rises.iter().sum::<f64>();
                 cause.evidence.gain = Some((bare - full) / rest);
-                cause.evidence.explained = (!judged_in_training).then_some(explained);
                 cause.evidence.gain_sigma = Some(standard_error_of_sum(&rises) / rest);
                 if is_plausible::<P>(without.prior_cost) {
                     // The other effects in the model keep the parameters plausible without this cause: only predicted motion can be evidence for it.
@@ -234,7 +221,6 @@ mod tests {
             rival_gain: None,
             size_ratio: ratio,
             size_ratio_sigma: ratio.map(|_| 0.05),
-            explained: None,
             beyond_scatter: None,
         }
     }
@@ -270,16 +256,6 @@ mod tests {
         let odds = PRIOR_ODDS * 0.5_f64.powi(RIVAL_POWER);
         assert!((beside(1.5) - odds / (1.0 + odds)).abs() < 1e-12);
         assert_eq!(beside(2.5), 0.0);
-    }
-
-    #[test]
-    fn a_name_beside_a_gap_that_stays_is_doubtful() {
-        let beside =
-            |explained: f64| Evidence { explained: Some(explained), ..evidence(1.0, None) }.probability();
-        assert_eq!(beside(1.0), evidence(1.0, None).probability());
-        let odds = PRIOR_ODDS * 0.5_f64.powf(EXPLAINED_POWER);
-        assert!((beside(0.5) - odds / (1.0 + odds)).abs() < 1e-12 && beside(0.1) < 0.4);
-        assert_eq!(beside(0.0), 0.0);
     }
 
     #[test]
