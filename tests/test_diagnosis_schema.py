@@ -96,7 +96,9 @@ def test_fields_of_one_name_have_places_of_their_own(data: Any) -> None:
     range_ = {"variable": "dq1", "from": 0.5, "to": 1.5}
     place = {"joint": 1, "share": 0.5, "regime": "fast", "detail": "", "range": range_}
     law = {"x": [0.0, 1.0], "torque": [0.0, 0.1], "sigma": [0.1, 0.1]}
-    unnamed = {"joint": 1, "variable": "q1", "unit": "rad", "share": 0.5, "law": law}
+    cells = [[0.0, 0.1], [0.2, 0.3]]
+    grid = {"variable": "q2", "unit": "rad", "x": [0.0, 1.0], "y": [0.0, 1.0], "torque": cells, "sigma": cells}
+    unnamed = {"joint": 1, "variable": "q1", "unit": "rad", "share": 0.5, "law": law, "grid": grid}
     found = losses(json.dumps(data | {"where": [place], "unnamed": [unnamed]}))
     assert not [line for line in found if "variable" in line]
 

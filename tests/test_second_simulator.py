@@ -11,7 +11,7 @@ from armgap.simulation import Effect
 pytest.importorskip("numba")
 
 from second_simulator.cases import Machine, draw_machine, draw_pushes, draw_reference, run
-from second_simulator.scoring import PARAMETERS, intervals, is_push
+from second_simulator.scoring import PARAMETERS, intervals, is_push, laws
 
 #: Both integrators and their steps [rad]; encoders are taken out.
 SAME = 2e-7
@@ -192,3 +192,34 @@ def test_intervals_hold_the_true_value_or_not():
     assert len(lines) == 4
     assert all("3 arms, 0.963 hold (theta1 0.67, theta2 1.00" in line for line in lines)
     assert intervals([]) == []
+
+
+def test_a_law_is_right_on_its_joint_over_its_variables_and_within_its_band() -> None:
+    x, y = np.array([-0.6, 0.1, 0.8]), np.array([-2.0, 0.0, 3.0])
+    torque = 0.5 * x[:, None] * np.abs(y)
+
+    def record(effect: str, *entries: dict[str, object]) -> dict[str, object]:
+        hidden = [{"effect": effect, "joint": 2, "parameters": {effect: 0.5}}] if effect else []
+        return {"family": "outside" if effect else "null", "effects": hidden, "unnamed": list(entries)}
+
+    def entry(joint: int, shift: float) -> dict[str, object]:
+        off = np.zeros((3, 3))
+        off[0, 0] = shift
+        sigma = np.full((3, 3), 0.1).tolist()
+        grid = {
+            "variable": "q2",
+            "x": y.tolist(),
+            "y": x.tolist(),
+            "torque": (torque + 7.0 + off).T.tolist(),
+            "sigma": sigma,
+        }
+        return {"joint": joint, "variable": "dq2", "law": {"x": [], "torque": [], "sigma": []}, "grid": grid}
+
+    over_time = {"joint": 2, "variable": "t", "law": {"x": [0.0, 5.0], "torque": [-1.25, 0.5], "sigma": [0.1, 0.1]}}
+    text = laws([
+        record("product", entry(2, 0.0)), record("product", entry(2, 9.0), entry(1, 0.0)), record("product", over_time), record("drift", over_time),
+        record("random_torque"), record("", over_time), record(""),
+    ])  # fmt: skip
+    assert "of 4 the joint and one or all of the variables are right in 3, all variables in 3" in text
+    assert "1 of 3 within their band" in text
+    assert "2 further entries; of 2 arms without an effect 1 have entries" in text

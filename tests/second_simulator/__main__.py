@@ -92,7 +92,7 @@ def answer(folder: Path, horizon: float) -> dict[str, Any]:
         "case": folder.name, **{k: key[k] for k in ("family", "design", "effects", "clutter", "exact")}, "pushes": key.get("pushes", []),
         "share": share,
         "verdict": found["verdict"], "causes": causes, "candidates": candidates, "gap": found["gap"], "seconds": seconds,
-        "checks": [c["check"] for c in found["checks"]], "where": found["where"][:2], "horizon": horizon,
+        "unnamed": found["unnamed"], "checks": [c["check"] for c in found["checks"]], "where": found["where"][:2], "horizon": horizon,
         "parameters": found["parameters"], "theta": key.get("theta"), "strength": key.get("strength"),
     }  # fmt: skip
 

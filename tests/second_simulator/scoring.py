@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,14 @@ EDGES = (0.0, 0.5, 0.75, 0.9, 1.001)
 HALF = 0.5
 #: Names of the parameters of the arm file, in the order of a key's ``theta``.
 PARAMETERS = ("theta1", "theta2", "theta3", "theta4", "theta5", "viscous1", "viscous2", "coulomb1", "coulomb2")
+#: Torques of effects outside the library, of unit size: the variables that they depend on, ``#`` for the number of the joint, and the function.
+LAWS: dict[str, tuple[tuple[str, ...], Callable[..., Any]]] = {
+    "cross_position": (("q1", "q2"), lambda q1, q2: np.sin(3.0 * q1) * np.cos(2.0 * q2)),
+    "drift": (("t",), lambda t: t),
+    "product": (("q#", "dq#"), lambda q, dq: q * np.abs(dq)),
+}
+#: Share of a law's range over which the true torque has to lie within the band.
+RANGE = 0.9
 #: Distance in time [s], beyond two of its standard deviations, within which a push counts as found.
 NEAR = 0.1
 
@@ -52,6 +61,50 @@ def pushes(records: list[Record]) -> str:
     false = sum(not right for _, right in pairs)
     bins = "; ".join(_bin(pairs, low, high) for low, high in itertools.pairwise(EDGES))
     return f"pushes: {found} of {len(true)} named; of {len(named)} named {false} false; {bins}"
+
+
+def laws(records: list[Record]) -> str:
+    """Return how often joint and variables of a torque without a name are right, and its law; and how many others are listed."""
+    asked, wrong = 0, 0
+    parts, bands = [], []
+    silent = [r for r in records if not r["effects"] and r["family"] == "null"]
+    for r in records:
+        for hidden in (h for h in r["effects"] if h["effect"] in LAWS):
+            asked += 1
+            names, torque = LAWS[hidden["effect"]]
+            true = [v.replace("#", str(hidden["joint"])) for v in names]
+            listed = r.get("unnamed", [])
+            good = [d for d in listed if d["joint"] == hidden["joint"] and set(_variables(d)) <= set(true)]
+            wrong += len(listed) - len(good)
+            parts += [set(_variables(d)) == set(true) for d in good[:1]]
+            for d in good[:1] if parts and parts[-1] else []:
+                order = [_variables(d).index(v) for v in true]
+                size = hidden["parameters"][hidden["effect"]]
+                bands.append(_in_band(d, lambda *x, at=order, law=torque, unit=size: unit * law(*(x[i] for i in at))))
+    entries = sum(bool(r.get("unnamed")) for r in silent)
+    within = (
+        f"{sum(b >= RANGE for b in bands)} of {len(bands)} within their band over {RANGE:.0%} of the range (median {np.median(bands):.2f})"
+        if bands
+        else "-"
+    )
+    return (
+        f"laws without a name: of {asked} the joint and one or all of the variables are right in {len(parts)}, "
+        f"all variables in {sum(parts)}; {within}; {wrong} further entries; of {len(silent)} arms without an effect {entries} have entries"
+    )
+
+
+def _variables(entry: Record) -> list[str]:
+    return [entry["variable"], *([entry["grid"]["variable"]] if "grid" in entry else [])]
+
+
+def _in_band(entry: Record, torque: Callable[..., Any]) -> float:
+    """Return the share of the nodes of a table at which the true torque lies within the 95 % interval, but for a constant."""
+    table: Record = entry.get("grid") or entry["law"]
+    axes = [np.array(table[axis]) for axis in ("x", "y") if axis in table]
+    found, sigma = np.array(table["torque"]), np.array(table["sigma"])
+    off = torque(*np.meshgrid(*axes, indexing="ij")) - found
+    off -= np.average(off, weights=sigma**-2.0)
+    return float(np.mean(np.abs(off) < 1.96 * sigma))
 
 
 def intervals(records: list[Record]) -> list[str]:
@@ -107,7 +160,7 @@ def report(records: list[Record], cases: bool) -> str:
             if c["effect"] != "external_pulse"
         ]
         lines.append(f"{label}: " + "; ".join(_bin(pairs, low, high) for low, high in itertools.pairwise(EDGES)))
-    lines += ["", pushes(records), *intervals(records)]
+    lines += ["", pushes(records), laws(records), *intervals(records)]
     if cases:
         lines += [""] + [_case(r) for r in records if not _right(r)]
         lines += [f"{r['case']}: {r['failed']}" for r in failed]

@@ -16,6 +16,7 @@ __all__ = [
     "Cause",
     "ChainPart",
     "Dependence",
+    "DependenceGrid",
     "DependenceLaw",
     "Diagnosis",
     "Equivalent",
@@ -270,19 +271,46 @@ class DependenceLaw:
 
 
 @dataclass(frozen=True)
+class DependenceGrid:
+    """Residual torque of a joint as a table over two variables.
+
+    Attributes
+    ----------
+    variable, unit : str
+        Second variable, named as the first, and its unit.
+    x, y : tuple of float
+        Means of the first and of the second variable in their classes, rising.
+    torque, sigma : tuple of tuple of float
+        Torque in each class of the first variable (rows) and of the second (columns) less the mean torque, and its standard deviation [N m or
+        N]. Cells that no sample lies in have torques by the table's smoothness; their standard deviations are too small.
+    """
+
+    variable: str
+    unit: str
+    x: tuple[float, ...]
+    y: tuple[float, ...]
+    torque: tuple[tuple[float, ...], ...]
+    sigma: tuple[tuple[float, ...], ...]
+
+
+@dataclass(frozen=True)
 class Dependence:
-    """Variable on which the part of a joint's residual torque depends that no named effect explains.
+    """Variable, or pair of variables, on which the part of a joint's residual torque depends that no named effect explains.
 
     Attributes
     ----------
     joint : int
         Joint that the torque acts on, from 1.
     variable, unit : str
-        ``"q1"``, ``"dq1"``, ``"ddq1"``, ``"tau1"`` and so on, or ``"t"``, the time since the log began, and its unit.
+        ``"q1"``, ``"dq1"``, ``"ddq1"``, ``"tau1"`` and so on, or ``"t"``, the time since the log began, and its unit; of two variables the one
+        that alone predicts more.
     share : float
-        Share of the residual torque's variance beyond noise that the law predicts in logs that it was not fitted to, 0 to 1.
+        Share of the residual torque's variance beyond noise that the table (of both variables, where there are two) predicts in logs that it was
+        not fitted to, 0 to 1.
     law : DependenceLaw
         Torque over the variable, an unnamed law that may differ for another arm, load or motion.
+    grid : DependenceGrid or None
+        Torque over the variable and a second one; None where the torque depends on one variable.
     """
 
     joint: int
@@ -290,6 +318,7 @@ class Dependence:
     unit: str
     share: float
     law: DependenceLaw
+    grid: DependenceGrid | None = None
 
 
 @dataclass(frozen=True)
@@ -479,7 +508,11 @@ def _cause(data: dict[str, Any]) -> Cause:
 
 def _dependence(data: dict[str, Any]) -> Dependence:
     law = {key: tuple(data["law"][key]) for key in ("x", "torque", "sigma")}
-    return Dependence(data["joint"], data["variable"], data["unit"], data["share"], DependenceLaw(**law))
+    grid = data.get("grid")
+    if grid is not None:
+        torque, sigma = (tuple(map(tuple, grid[key])) for key in ("torque", "sigma"))
+        grid = DependenceGrid(grid["variable"], grid["unit"], tuple(grid["x"]), tuple(grid["y"]), torque, sigma)
+    return Dependence(data["joint"], data["variable"], data["unit"], data["share"], DependenceLaw(**law), grid)
 
 
 def _chain_part(data: dict[str, Any]) -> ChainPart:

@@ -204,15 +204,20 @@ def law(entry: dict[str, Any]) -> Any:
     return f
 
 
-def dependence(entry: dict[str, Any]) -> Any:
-    """Return a chart of residual torque that no named effect explains, over the variable that it depends on, with 95 % intervals.
+def dependence(entry: dict[str, Any], torque_unit: str) -> Any:
+    """Return a chart of residual torque that no named effect explains: over one variable with 95 % intervals, over two by colour.
 
     Parameters
     ----------
     entry : dict
         One entry of a diagnosis' ``unnamed``.
+    torque_unit : str
+        Unit of the torque.
     """
     from bokeh.models import ColumnDataSource, Whisker
+
+    if entry.get("grid"):
+        return _cells(entry, torque_unit)
 
     law = entry["law"]
     f = figure("", f"{symbol_text(entry['variable'])} [{unit_text(entry['unit'])}]", "", height=300)
@@ -226,6 +231,48 @@ def dependence(entry: dict[str, Any]) -> Any:
     f.scatter(law["x"], law["torque"], size=8, color=BEFORE, fill_color=None, line_width=2)
     _reach(f, [*ends["low"], *ends["high"]], margin=0.05)
     return f
+
+
+def _cells(entry: dict[str, Any], torque_unit: str) -> Any:
+    """Return a chart of torque over two variables: a cell for each pair of classes, its torque as colour."""
+    from bokeh.models import ColorBar, ColumnDataSource, LinearColorMapper
+    from bokeh.palettes import interp_palette
+
+    grid = entry["grid"]
+    names = [f"{symbol_text(d['variable'])} [{unit_text(d['unit'])}]" for d in (entry, grid)]
+    f = figure("", *names, height=300)
+    (left, right), (bottom, top) = (_edges(grid[axis]) for axis in ("x", "y"))
+    pairs = [(i, k) for i in range(len(left)) for k in range(len(bottom))]
+    cells = {
+        "left": [left[i] for i, _ in pairs],
+        "right": [right[i] for i, _ in pairs],
+        "bottom": [bottom[k] for _, k in pairs],
+        "top": [top[k] for _, k in pairs],
+        "torque": [grid["torque"][i][k] for i, k in pairs],
+    }
+    most = max(map(abs, cells["torque"])) or 1.0
+    colours = LinearColorMapper(interp_palette([AFTER, "#f7f7f7", BEFORE], 101), low=-most, high=most)
+    f.quad(
+        "left",
+        "right",
+        "top",
+        "bottom",
+        source=ColumnDataSource(cells),
+        line_color=None,
+        color={"field": "torque", "transform": colours},
+    )
+    f.add_layout(
+        ColorBar(color_mapper=colours, title=f"[{torque_unit}]", width=12, background_fill_color=None), "right"
+    )
+    return f
+
+
+def _edges(means: Sequence[float]) -> tuple[list[float], list[float]]:
+    """Return lower and upper edges of classes: halfway between their means, and as far beyond the outer ones."""
+    x = np.asarray(means, dtype=float)
+    middle = (x[1:] + x[:-1]) / 2
+    first, last = (2 * x[0] - middle[0], 2 * x[-1] - middle[-1]) if len(x) > 1 else (x[0] - 0.5, x[0] + 0.5)
+    return [float(first), *middle.tolist()], [*middle.tolist(), float(last)]
 
 
 def _reach(f: Any, values: Sequence[float], margin: float = 0.5) -> None:

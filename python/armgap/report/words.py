@@ -19,6 +19,7 @@ from armgap.several_joints import place_text
 __all__ = [
     "SummaryAnswer",
     "answers",
+    "depends_text",
     "doubtful",
     "each_joint",
     "error_text",
@@ -383,6 +384,18 @@ def _limits(data: Data, place: Data) -> str:
     return f"{text} {unit}".strip()
 
 
+def depends_text(entry: Data) -> str:
+    """Return what a torque without a name depends on: the symbol of its variable, or of both.
+
+    Parameters
+    ----------
+    entry : dict
+        One entry of a diagnosis' ``unnamed``.
+    """
+    grid = entry.get("grid")
+    return " and ".join(symbol_text(d["variable"]) for d in (entry, grid) if d)
+
+
 def symbol_text(variable: str) -> str:
     """Return the meaning of a variable such as ``dq2``; any other text unchanged.
 
@@ -424,7 +437,7 @@ def _which(data: Data) -> tuple[str, str]:
         headline, text = _NO_CAUSE.get(data["verdict"], ("No cause was named", ""))
         if data["verdict"] == "unexplained" and (data.get("arm") or {}).get("kind") == SERIAL:
             headline, text = "None that was tested", _untested(data)
-        depends = ", ".join(f"{symbol_text(d['variable'])} (joint {d['joint']})" for d in data.get("unnamed") or [])
+        depends = ", ".join(f"{depends_text(d)} (joint {d['joint']})" for d in data.get("unnamed") or [])
         is_listed = depends and data["verdict"] == "unexplained"
         return headline, f"{text} What stays depends on {depends}." if is_listed else text
     headline = _capital(" and ".join(_counted([f"{title(c['effect'])}, {place_text(c)}" for c in causes])))

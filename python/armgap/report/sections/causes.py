@@ -8,7 +8,7 @@ from typing import Any
 from armgap.report import charts
 from armgap.report.page import Bar, Cell, Drawing, Section, Table
 from armgap.report.sections.model_labels import Data, load_text, small_unit, torque_unit
-from armgap.report.words import error_text, figure, named, percent, sizes, symbol_text, title
+from armgap.report.words import depends_text, error_text, figure, named, percent, sizes, symbol_text, title
 from armgap.several_joints import place_text
 
 __all__ = ["candidates", "evidence", "look_alikes", "ranking", "unnamed"]
@@ -68,7 +68,8 @@ def unnamed(data: Data) -> Section | None:
     unit = torque_unit(data)
     text = (
         f"The {load_text(data)} that stays depends on these variables, in logs that each table was not fitted to. No effect of the library is "
-        "behind them: they are tables, and another load or motion may have others. Each is drawn beside its mean, with 95 % intervals."
+        "behind them: they are tables, and another load or motion may have others. Each is drawn beside its mean: over one variable with 95 % "
+        "intervals, over two by colour."
     )
     header = (
         "joint",
@@ -79,19 +80,23 @@ def unnamed(data: Data) -> Section | None:
     rows = [
         (
             str(d["joint"]),
-            symbol_text(d["variable"]),
+            depends_text(d),
             Bar(d["share"], percent(d["share"]), charts.MEASURED),
-            figure(max(abs(y) for y in d["law"]["torque"])),
+            figure(max(abs(y) for y in _torques(d))),
         )
         for d in found
     ]
     drawn = [
-        Drawing(
-            f"Joint {d['joint']}: {load_text(data)} [{unit}] over {symbol_text(d['variable'])}", charts.dependence(d)
-        )
+        Drawing(f"Joint {d['joint']}: {load_text(data)} [{unit}] over {depends_text(d)}", charts.dependence(d, unit))
         for d in found
     ]
     return Section("What the rest depends on", text=[text], tables=[Table(header, rows)], figures=drawn, columns=2)
+
+
+def _torques(entry: Data) -> list[float]:
+    """Return the torques of a table without a name."""
+    grid = entry.get("grid")
+    return [y for row in grid["torque"] for y in row] if grid else entry["law"]["torque"]
 
 
 def ranking(data: Data) -> Section | None:

@@ -1,6 +1,7 @@
 //! Torque that depends on one variable of the motion, as a table.
 
-use crate::locate::table_form::{MotionPoint, TableForm};
+use crate::locate::table_form::{MotionPoint, Place, TableForm};
+use crate::locate::variable_classes::hats;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -92,24 +93,29 @@ impl MotionVariable {
     }
 }
 
-/// Dependence of a joint's residual torque on a variable of the motion that no effect of the library explains.
+/// Dependence of a joint's residual torque on one variable of the motion, or on two together, that no effect of the library explains.
 #[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct Dependence {
     /// Joint that the torque acts on, counted from 1.
     #[schemars(range(min = 1))]
     pub joint: usize,
-    /// Name of the variable that the torque depends on: `q1`, `dq1`, `ddq1`, `tau1` and so on, or `t`, the time since the log began.
+    /// Name of the variable that the torque depends on: `q1`, `dq1`, `ddq1`, `tau1` and so on, or `t`, the time since the log began. Of two variables
+    /// the one that alone predicts more.
     pub variable: String,
-    /// Variable that the torque depends on and factor of the table, in a form that can be evaluated.
+    /// Variables that the torque depends on and factor of the table, in a form that can be evaluated.
     #[serde(skip)]
     pub form: TableForm,
     /// SI unit of the variable that the torque depends on.
     pub unit: &'static str,
-    /// Share, 0 to 1, of the variance of the joint's residual torque beyond noise that the fitted table predicts in logs it was not fitted to.
+    /// Share, 0 to 1, of the variance of the joint's residual torque beyond noise that the fitted table (of both variables, where there are two)
+    /// predicts in logs it was not fitted to.
     #[schemars(range(min = 0, max = 1))]
     pub share: f64,
     /// Torque as a table over the variable.
     pub law: DependenceLaw,
+    /// Torque as a table over the variable and a second one; none where the torque depends on one variable.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub grid: Option<DependenceGrid>,
 }
 
 /// Torque on a joint as a table over one variable of the motion, to be added to the mean torque and to the joint's earlier tables.
@@ -127,26 +133,54 @@ pub struct DependenceLaw {
     pub constant: [f64; 2],
 }
 
-impl DependenceLaw {
-    /// Torque at the value `x` of the variable where the table's factor is `factor`, N m or N: `constant` and linear interpolation of the table, held
-    /// constant beyond its ends.
-    pub fn at(&self, [factor, x]: [f64; 2]) -> f64 {
-        let (Some(first), Some(last)) = (self.torque.first(), self.torque.last()) else { return 0.0 };
-        let table = match self.x.partition_point(|edge| *edge <= x) {
-            0 => *first,
-            i if i == self.x.len() => *last,
-            i => {
-                let part = (x - self.x[i - 1]) / (self.x[i] - self.x[i - 1]);
-                self.torque[i - 1] + part * (self.torque[i] - self.torque[i - 1])
+/// Torque on a joint as a table over two variables of the motion, in place of the table over the first alone.
+#[derive(Debug, Clone, JsonSchema, Serialize)]
+pub struct DependenceGrid {
+    /// Name of the second variable, as that of the first.
+    pub variable: String,
+    /// SI unit of the second variable.
+    pub unit: &'static str,
+    /// Mean of the first variable in each of its classes, ascending, in its SI unit.
+    pub x: Vec<f64>,
+    /// Mean of the second variable in each of its classes, ascending, in its SI unit.
+    pub y: Vec<f64>,
+    /// Torque in each class of the first variable (rows) and of the second (columns) less the mean torque, N m or N. Cells that no sample lies in have
+    /// values by the table's smoothness.
+    pub torque: Vec<Vec<f64>>,
+    /// Standard deviation of the torque in each cell, from the scatter over blocks of one second, N m or N; too small in cells that no sample lies in.
+    pub sigma: Vec<Vec<f64>>,
+    /// As [`DependenceLaw::constant`].
+    #[serde(skip)]
+    pub constant: [f64; 2],
+}
+
+impl Dependence {
+    /// Torque, N m or N, where the table is looked up: linear interpolation between the classes' means, bilinear over two variables, held constant
+    /// beyond the ends.
+    pub fn at(&self, Place { factor, x, y }: Place) -> f64 {
+        let (constant, table) = match &self.grid {
+            None => {
+                let terms =
+                    hats(&self.law.x, x).map(|(i, a)| a * self.law.torque.get(i).copied().unwrap_or(0.0));
+                (self.law.constant, terms.iter().sum::<f64>())
+            }
+            Some(grid) => {
+                let row = |i: usize| hats(&grid.y, y).map(|(k, b)| b * grid.torque[i][k]).iter().sum::<f64>();
+                (grid.constant, hats(&grid.x, x).map(|(i, a)| a * row(i)).iter().sum())
             }
         };
-        self.constant[1] + factor * (self.constant[0] + table)
+        constant[1] + factor * (constant[0] + table)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn over(law: DependenceLaw, grid: Option<DependenceGrid>) -> Dependence {
+        let form = TableForm::over(MotionVariable::Position(0));
+        Dependence { joint: 1, variable: "q1".to_owned(), form, unit: "rad", share: 0.5, law, grid }
+    }
 
     #[test]
     fn a_table_is_followed_between_its_classes_and_held_beyond_them() {
@@ -156,8 +190,29 @@ mod tests {
             sigma: vec![0.1; 3],
             constant: [8.0, 2.0],
         };
+        let found = over(law, None);
         for (x, torque) in [(-5.0, 10.5), (-1.0, 10.5), (-0.5, 10.0), (1.0, 10.5), (2.0, 11.5), (9.0, 11.5)] {
-            assert!((law.at([1.0, x]) - torque).abs() < 1e-12, "{x}");
+            assert!((found.at(Place { factor: 1.0, x, y: 7.0 }) - torque).abs() < 1e-12, "{x}");
         }
+    }
+
+    #[test]
+    fn a_grid_is_followed_along_both_variables() {
+        let law = DependenceLaw { x: vec![0.0], torque: vec![99.0], sigma: vec![1.0], constant: [99.0; 2] };
+        let grid = DependenceGrid {
+            variable: "dq1".to_owned(),
+            unit: "rad/s",
+            x: vec![0.0, 1.0],
+            y: vec![0.0, 2.0, 3.0],
+            torque: vec![vec![0.0, 2.0, 3.0], vec![10.0, 14.0, 16.0]],
+            sigma: vec![],
+            constant: [0.0; 2],
+        };
+        let found = over(law, Some(grid));
+        // Between the nodes the torque is y + x * (10 + y).
+        for (x, y) in [(0.0, 0.0), (0.0, 1.5), (1.0, 3.0), (0.3, 0.7), (0.5, 2.5)] {
+            assert!((found.at(Place { factor: 1.0, x, y }) - (y + x * (10.0 + y))).abs() < 1e-12, "{x} {y}");
+        }
+        assert_eq!(found.at(Place { factor: 2.0, x: 5.0, y: -5.0 }), 20.0);
     }
 }

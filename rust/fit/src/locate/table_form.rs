@@ -1,4 +1,4 @@
-//! Forms of a torque as a table: the variable that it depends on, and a factor of the motion that multiplies it.
+//! Forms of a torque as a table: the one or two variables that it depends on, and a factor of the motion that multiplies it.
 
 use crate::locate::dependence::MotionVariable;
 use nalgebra::SVector;
@@ -27,6 +27,8 @@ pub struct TableForm {
     pub factor: Factor,
     /// What the table depends on.
     pub variable: MotionVariable,
+    /// Second variable of a table over a grid of two; none for a table over one.
+    pub second: Option<MotionVariable>,
 }
 
 /// Motion and torque of all joints at one sample of a log.
@@ -40,12 +42,32 @@ pub struct MotionPoint<const N: usize> {
     pub tau: SVector<f64, N>,
 }
 
+/// Where along a log a table is looked up.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Place {
+    /// Factor that multiplies the table.
+    pub factor: f64,
+    /// Value of the table's variable.
+    pub x: f64,
+    /// Value of the second variable, 0 for a table over one.
+    pub y: f64,
+}
+
 impl TableForm {
-    /// Forms of the tables on joint `own` (from 0) that results may list: torque over one variable of the motion. `torques`: standard deviations of
-    /// all joints' commanded torques, N m or N.
+    /// A torque over one variable.
+    pub fn over(variable: MotionVariable) -> Self {
+        Self::times(Factor::One, variable)
+    }
+
+    /// A table over one variable, multiplied by a factor.
+    pub fn times(factor: Factor, variable: MotionVariable) -> Self {
+        Self { factor, variable, second: None }
+    }
+
+    /// Forms of the tables over one variable on joint `own` (from 0) that results may list: torque over each variable of the motion. `torques`:
+    /// standard deviations of all joints' commanded torques, N m or N.
     pub fn listed(torques: &[f64], own: usize) -> Vec<Self> {
-        let form = |variable| Self { factor: Factor::One, variable };
-        MotionVariable::all(torques.len(), own).into_iter().map(form).collect()
+        MotionVariable::all(torques.len(), own).into_iter().map(Self::over).collect()
     }
 
     /// Forms of the tables on joint `own` (from 0) that may stand in the place of a named cause: those that results may list, dry friction whose size
@@ -53,27 +75,41 @@ impl TableForm {
     /// `torques`: standard deviations of all joints' commanded torques, N m or N.
     pub fn rivals(torques: &[f64], own: usize) -> Vec<Self> {
         let n = torques.len();
-        let of = |factor, variable| Self { factor, variable };
         let time_or_place = [MotionVariable::Time, MotionVariable::Position(own)];
         let mut forms = Self::listed(torques, own);
-        forms.extend((1..n).map(|i| of(Factor::Direction(own), MotionVariable::Position((own + i) % n))));
-        forms.push(of(Factor::Direction(own), MotionVariable::Load(own)));
+        forms.extend(
+            (1..n).map(|i| Self::times(Factor::Direction(own), MotionVariable::Position((own + i) % n))),
+        );
+        forms.push(Self::times(Factor::Direction(own), MotionVariable::Load(own)));
         for factor in [Factor::Direction(own), Factor::Torque(own), Factor::Velocity(own)] {
-            forms.extend(time_or_place.map(|variable| of(factor, variable)));
+            forms.extend(time_or_place.map(|variable| Self::times(factor, variable)));
         }
-        forms.extend(STOPS.map(|share| of(Factor::One, MotionVariable::Stop(own, share * torques[own]))));
+        forms.extend(STOPS.map(|share| Self::over(MotionVariable::Stop(own, share * torques[own]))));
         forms
     }
 
-    /// Factor and variable at every point of a log; the direction is smoothed below the speeds `slow`, rad/s or m/s.
-    pub fn along<const N: usize>(self, points: &[MotionPoint<N>], slow: &[f64; N]) -> Vec<[f64; 2]> {
+    /// Forms of the tables over two variables on joint `own` (from 0) of `n`: positions and velocities of all joints, each with each, and the joint's own
+    /// commanded torque with its own position or velocity. Products of these, and laws multiplied by the size or the sign of a speed, are among them.
+    pub fn over_two(n: usize, own: usize) -> Vec<Self> {
+        let states = |j| [MotionVariable::Position(j), MotionVariable::Velocity(j)];
+        let all: Vec<MotionVariable> = (0..n).flat_map(states).collect();
+        let mut pairs: Vec<[MotionVariable; 2]> =
+            all.iter().enumerate().flat_map(|(i, b)| all[..i].iter().map(move |a| [*a, *b])).collect();
+        pairs.extend(states(own).map(|state| [MotionVariable::Torque(own), state]));
+        pairs.into_iter().map(|[a, b]| Self { second: Some(b), ..Self::over(a) }).collect()
+    }
+
+    /// Factor and variables at every point of a log; the direction is smoothed below the speeds `slow`, rad/s or m/s.
+    pub fn along<const N: usize>(self, points: &[MotionPoint<N>], slow: &[f64; N]) -> Vec<Place> {
         let factor = |x: &MotionPoint<N>| match self.factor {
             Factor::One => 1.0,
             Factor::Direction(j) => (x.motion[1][j] / slow[j]).tanh(),
             Factor::Torque(j) => x.tau[j],
             Factor::Velocity(j) => x.motion[1][j],
         };
-        points.iter().map(factor).zip(self.variable.along(points)).map(<[f64; 2]>::from).collect()
+        let second = self.second.map_or_else(|| vec![0.0; points.len()], |second| second.along(points));
+        let variables = self.variable.along(points).into_iter().zip(second);
+        points.iter().map(factor).zip(variables).map(|(factor, (x, y))| Place { factor, x, y }).collect()
     }
 }
 
@@ -93,13 +129,20 @@ mod tests {
     #[test]
     fn a_factor_multiplies_and_a_variable_is_looked_up() {
         let points = points();
-        let along = |factor, variable| TableForm { factor, variable }.along(&points, &[0.01]);
+        let along = |factor, variable| TableForm::times(factor, variable).along(&points, &[0.01]);
         for (k, x) in points.iter().enumerate() {
-            let [direction, load] = along(Factor::Direction(0), MotionVariable::Load(0))[k];
+            let Place { factor: direction, x: load, .. } =
+                along(Factor::Direction(0), MotionVariable::Load(0))[k];
             assert_eq!(load, x.tau[0].abs());
             assert!((direction - x.motion[1][0].signum()).abs() < 1e-3 || x.motion[1][0].abs() < 0.05);
-            assert_eq!(along(Factor::Velocity(0), MotionVariable::Time)[k], [x.motion[1][0], x.t]);
-            assert_eq!(along(Factor::Torque(0), MotionVariable::Position(0))[k], [x.tau[0], x.motion[0][0]]);
+            assert_eq!(
+                along(Factor::Velocity(0), MotionVariable::Time)[k],
+                Place { factor: x.motion[1][0], x: x.t, y: 0.0 }
+            );
+            assert_eq!(
+                along(Factor::Torque(0), MotionVariable::Position(0))[k],
+                Place { factor: x.tau[0], x: x.motion[0][0], y: 0.0 }
+            );
         }
     }
 
@@ -107,11 +150,30 @@ mod tests {
     fn a_stop_is_what_a_play_keeps_back() {
         let points = points();
         let radius = 0.3;
-        let form = TableForm { factor: Factor::One, variable: MotionVariable::Stop(0, radius) };
+        let form = TableForm::over(MotionVariable::Stop(0, radius));
         let mut play = points[0].tau[0];
-        for (x, [_, stop]) in points.iter().zip(form.along(&points, &[0.01])) {
+        for (x, Place { x: stop, .. }) in points.iter().zip(form.along(&points, &[0.01])) {
             play = play.clamp(x.tau[0] - radius, x.tau[0] + radius);
             assert!((stop - (x.tau[0] - play)).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn tables_over_two_variables_take_each_pair_once() {
+        let pairs: Vec<[String; 2]> = TableForm::over_two(2, 1)
+            .into_iter()
+            .map(|form| [form.variable, form.second.unwrap()].map(MotionVariable::name))
+            .collect();
+        let of = |a: &str, b: &str| [a.to_owned(), b.to_owned()];
+        assert_eq!(pairs.len(), 8);
+        assert!((1..8).all(|i| !pairs[..i].contains(&pairs[i]) && pairs[i][0] != pairs[i][1]));
+        assert!(pairs.contains(&of("q1", "q2")) && pairs.contains(&of("dq1", "q2")));
+        assert!(pairs.contains(&of("tau2", "dq2")) && !pairs.contains(&of("tau1", "q1")));
+        let form =
+            TableForm { second: Some(MotionVariable::Time), ..TableForm::over(MotionVariable::Torque(0)) };
+        let points = points();
+        for (x, place) in points.iter().zip(form.along(&points, &[0.01])) {
+            assert_eq!(place, Place { factor: 1.0, x: x.tau[0], y: x.t });
         }
     }
 

@@ -1,15 +1,17 @@
-//! Dependences of the residual torque that no effect explains: tables over one variable of the motion.
+//! Dependences of the residual torque that no effect explains: tables over one variable of the motion, or over two.
 //!
-//! For every joint the residual torque by inverse dynamics is regressed on one variable of the motion at a time, as a table over classes of equal
-//! count (the regressogram of Tukey 1961), together with the arm's own parameters, because a torque that the model leaves out has biased their fitted
-//! values. Residual torque, regressor and classes pass the same low-pass filter, so that neither noise of the acceleration nor a lag affects only one
-//! of them. Tables are added one after another (forward selection). A table counts if it predicts logs that it was not fitted to: each log in turn is
+//! For every joint the residual torque by inverse dynamics is regressed on one variable of the motion at a time, or on two together, as a piecewise
+//! linear table with nodes at the means of classes of equal count, beside the arm's own parameters, because a torque that the model leaves out has
+//! biased their fitted values. Residual torque, regressor and table pass the same low-pass filter, so that neither noise of the acceleration nor a
+//! lag affects only one of them. Tables are added one after another (forward selection). A table counts if it predicts logs that it was not fitted to: each log in turn is
 //! left out, and its residual under the table of the remaining logs is compared with its residual under the parameters alone. The scatter of the gain
 //! over blocks of one second shows whether the gain may be due to chance.
 
-use crate::locate::dependence::{Dependence, DependenceLaw};
-use crate::locate::table_form::{MotionPoint, TableForm};
-use crate::locate::variable_classes::{CLASSES, Classes};
+use crate::likelihood::solve::Prior;
+use crate::locate::dependence::{Dependence, DependenceGrid, DependenceLaw};
+use crate::locate::table_form::{MotionPoint, Place, TableForm};
+use crate::locate::table_regression::{Rest, Table, squares};
+use crate::locate::variable_classes::Classes;
 use crate::log::track::Track;
 use crate::model::hypothesis::Hypothesis;
 use crate::numeric::low_pass::LowPass;
@@ -17,7 +19,7 @@ use crate::predict::residual_torque::{
     InverseDynamicsResidual, half_width, inverse_dynamics_residuals, rms, rms_speeds, slow_speeds,
 };
 use armgap_core::arm::Arm;
-use nalgebra::{DMatrix, DVector, SMatrix, SVector};
+use nalgebra::{SMatrix, SVector};
 
 /// Standard deviation in time of the Gaussian low-pass filter of residual torques, s: cut-off 7 Hz, above arms' motion and below most noise of
 /// encoders' second differences.
@@ -31,10 +33,6 @@ const AT_REST_SHARE: f64 = 0.1;
 
 /// Length of the blocks over which gains in prediction are taken as independent, s: residual torques are correlated over 0.05 to 0.3 s.
 const BLOCK_S: f64 = 1.0;
-
-/// Number of points that count as one independent point, because their errors are correlated by the low-pass filter and by the residual torque
-/// itself.
-const CORRELATED: f64 = 10.0;
 
 /// Least decrease of the squared residual torque of left-out logs by a table, in standard deviations of this decrease. Where the torque does not
 /// depend on the variable, a table predicts left-out logs worse than no table.
@@ -89,8 +87,8 @@ impl<const N: usize> LogResidual<N> {
         self.samples.iter().map(|x| x.t - self.samples[0].t).collect()
     }
 
-    /// Factor and variable of a form at every sample.
-    pub fn along(&self, form: TableForm) -> Vec<[f64; 2]> {
+    /// Factor and variables of a form at every sample.
+    pub fn along(&self, form: TableForm) -> Vec<Place> {
         let first = self.samples[0].t;
         let point =
             |x: &InverseDynamicsResidual<N>| MotionPoint { t: x.t - first, motion: x.motion, tau: x.tau };
@@ -99,46 +97,26 @@ impl<const N: usize> LogResidual<N> {
     }
 }
 
-/// Low-passed residual torque of one joint over all logs, with all variables that it may depend on.
-#[derive(Debug, Clone, Default)]
-struct Rest {
-    /// Variables that the residual torque may depend on, cut into classes.
-    variables: Vec<Classes>,
-    /// Residual torque at each point, N m or N.
-    torque: Vec<f64>,
-    /// Sum of squares, over all points, of the residual torque due to noise of the positions.
-    noise: f64,
-    /// Regressor row at each point without tables: torque on the joint, N m or N, due to one standard deviation (arm file) of each of the arm's
-    /// parameters, and last the constant 1.
-    base: Vec<Vec<f64>>,
-    /// Index of the log that each point belongs to.
-    log: Vec<usize>,
-    /// Whether the torques of the tables are fitted to each log.
-    teaches: Vec<bool>,
-    /// Index of the block of one second that each point belongs to, counted through all logs.
-    block: Vec<usize>,
-}
-
 /// Options of the search for dependences of the residual torque.
-#[derive(Debug, Clone, Copy)]
-pub struct Wanted {
+#[derive(Clone, Copy)]
+pub struct Wanted<'a> {
     /// Largest number of tables for one joint.
     pub most: usize,
     /// Whether the joints are rotary rather than linear.
     pub rotary: bool,
     /// Forms that the tables of a joint (from 0) may have, where the joints' commanded torques have these standard deviations, N m or N.
-    pub forms: fn(&[f64], usize) -> Vec<TableForm>,
+    pub forms: &'a dyn Fn(&[f64], usize) -> Vec<TableForm>,
 }
 
-/// Dependences of all joints' residual torques on variables of the motion, strongest first; `sigma`: standard deviations of the parameters `theta`.
+/// Dependences of all joints' residual torques on variables of the motion, strongest first; `theta`: parameters behind the residual torques.
 pub fn dependences<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     arm: &A,
     theta: &[f64; P],
-    sigma: &[f64; P],
+    prior: &Prior<P>,
     logs: &[LogResidual<N>],
-    wanted: Wanted,
+    wanted: Wanted<'_>,
 ) -> Vec<Dependence> {
-    let of_joint = |j| Rest::of_joint(arm, theta, sigma, logs, j, wanted).dependences(j + 1, wanted);
+    let of_joint = |j| Rest::of_joint(arm, theta, prior, logs, j, wanted).dependences(j + 1, wanted);
     let mut found: Vec<Dependence> = (0..N).flat_map(of_joint).collect();
     found.sort_by(|a, b| b.share.total_cmp(&a.share));
     found
@@ -149,12 +127,13 @@ impl Rest {
     fn of_joint<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         arm: &A,
         theta: &[f64; P],
-        sigma: &[f64; P],
+        prior: &Prior<P>,
         logs: &[LogResidual<N>],
         j: usize,
-        wanted: Wanted,
+        wanted: Wanted<'_>,
     ) -> Self {
-        let mut rest = Self::default();
+        let away = (0..P).map(|i| (theta[i] - prior.theta[i]) / prior.sigma[i]).collect();
+        let mut rest = Self { away, ..Self::default() };
         let lows: Vec<LowPass> =
             logs.iter().map(|log| LowPass::new(&log.times(), GRID_S, LOW_PASS_S)).collect();
         let mut kept: Vec<Vec<usize>> = Vec::new();
@@ -165,8 +144,9 @@ impl Rest {
             let still = series(&|x| f64::from(u8::from(x.motion[1][j].abs() < log.slow[j])));
             let points: Vec<usize> = (0..low.grid.len()).filter(|i| still[*i] < AT_REST_SHARE).collect();
             let torque = series(&|x| x.residual[j]);
-            let columns: Vec<Vec<f64>> =
-                (0..P).map(|i| series(&|x| sigma[i] * column(arm, &x.motion, i, &log.slow)[j])).collect();
+            let columns: Vec<Vec<f64>> = (0..P)
+                .map(|i| series(&|x| prior.sigma[i] * column(arm, &x.motion, i, &log.slow)[j]))
+                .collect();
             // Variance of the second derivative of white noise behind a Gaussian low-pass.
             let curvature = 3.0 * log.period / (8.0 * std::f64::consts::PI.sqrt() * LOW_PASS_S.powi(5));
             let middle = &log.samples[log.samples.len() / 2].motion[0];
@@ -192,35 +172,8 @@ impl Rest {
         rest
     }
 
-    fn blocks(&self) -> usize {
-        self.block.last().map_or(0, |b| b + 1)
-    }
-
-    fn logs(&self) -> usize {
-        self.teaches.len()
-    }
-
-    /// Regression of the residual torque on the arm's parameters and on tables over the variables `laws`.
-    fn regression<'a>(&'a self, laws: Vec<&'a Classes>) -> Regression<'a> {
-        let own = self.base.first().map_or(0, Vec::len);
-        let k = own + CLASSES * laws.len();
-        let mut normal = vec![(DMatrix::zeros(k, k), DVector::zeros(k)); self.logs()];
-        for (i, y) in self.torque.iter().enumerate() {
-            let row = row(&self.base[i], &laws, i);
-            let (matrix, right) = &mut normal[self.log[i]];
-            matrix.ger(1.0, &row, &row, 1.0);
-            right.axpy(*y, &row, 1.0);
-        }
-        // The prior of the parameters is the arm file's; a class counts as if it had one further point, with a typical factor and zero torque.
-        let variance = self.torque.iter().map(|y| y * y).sum::<f64>() / self.torque.len().max(1) as f64;
-        let of_table = |i: usize| if i < own { 1.0 } else { laws[(i - own) / CLASSES].factor_square };
-        let precision = (0..k).map(|i| if i + 1 < own { CORRELATED * variance } else { of_table(i) });
-        let ridge = DMatrix::from_diagonal(&DVector::from_iterator(k, precision));
-        Regression { rest: self, laws, normal, ridge }
-    }
-
     /// Dependences of the joint's residual torque, found by forward selection, in the order in which they were added.
-    fn dependences(&self, joint: usize, wanted: Wanted) -> Vec<Dependence> {
+    fn dependences(&self, joint: usize, wanted: Wanted<'_>) -> Vec<Dependence> {
         let mut found: Vec<Dependence> = Vec::new();
         if self.blocks() < FEWEST_BLOCKS || self.logs() < 2 {
             return found;
@@ -232,27 +185,78 @@ impl Rest {
         while found.len() < wanted.most && whole > self.noise {
             let with = |law| taken.iter().copied().chain(std::iter::once(law)).collect::<Vec<&Classes>>();
             let open = self.variables.iter().filter(|v| taken.iter().all(|t| t.form != v.form));
-            let left = open.filter_map(|law| Some((law, self.regression(with(law)).left_out()?)));
-            let Some((law, left)) = left.min_by(|(_, a), (_, b)| squares(a).total_cmp(&squares(b))) else {
-                break;
+            let tried: Vec<(&Classes, Vec<f64>)> =
+                open.filter_map(|law| Some((law, self.regression(with(law)).left_out()?))).collect();
+            let best = |of_two: bool| {
+                let of = tried.iter().filter(|(law, _)| law.form.second.is_some() == of_two);
+                of.min_by(|(_, a), (_, b)| squares(a).total_cmp(&squares(b)))
             };
-            let share = (squares(&before) - squares(&left)) / whole;
-            if share < TABLE_EXPLAINED_SHARE || certainty(&before, &left, self) < CERTAIN_TABLE {
-                break;
-            }
-            let Some(table) = self.regression(with(law)).last_law() else { break };
-            found.push(Dependence {
-                joint,
-                variable: law.form.variable.name(),
-                form: law.form,
-                unit: law.form.variable.unit(wanted.rotary),
-                share: share.min(1.0),
-                law: table,
-            });
+            let share = |before: &[f64], left: &[f64]| (squares(before) - squares(left)) / whole;
+            let counts = |before: &[f64], left: &[f64]| {
+                share(before, left) >= TABLE_EXPLAINED_SHARE && self.certainty(before, left) >= CERTAIN_TABLE
+            };
+            let one = best(false).filter(|(_, left)| counts(&before, left));
+            // A table over two variables has to predict more than the best one over one.
+            let two = best(true).filter(|(_, left)| counts(one.map_or(&before, |(_, left)| left), left));
+            let Some((law, left)) = two.or(one) else { break };
+            let Some(table) = self.regression(with(law)).last_table() else { break };
+            let share = share(&before, left).min(1.0);
+            let Some(entry) = self.entry(law.form, table, share, (joint, wanted.rotary)) else { break };
+            found.push(entry);
             taken.push(law);
-            before = left;
+            before.clone_from(left);
         }
         found
+    }
+
+    /// A fitted table on `joint`, counted from 1, with a share of the residual torque's variance, as an entry of results; of two variables the one that
+    /// alone predicts more comes first. None where no table over that variable alone can be fitted.
+    fn entry(
+        &self,
+        form: TableForm,
+        table: Table,
+        share: f64,
+        (joint, rotary): (usize, bool),
+    ) -> Option<Dependence> {
+        let law = |table: Table| DependenceLaw {
+            x: table.nodes[0].clone(),
+            torque: table.torque,
+            sigma: table.sigma,
+            constant: table.constant,
+        };
+        let made = |form: TableForm, law, grid| Dependence {
+            joint,
+            variable: form.variable.name(),
+            form,
+            unit: form.variable.unit(rotary),
+            share,
+            law,
+            grid,
+        };
+        let Some(second) = form.second else { return Some(made(form, law(table), None)) };
+        let alone = |variable| {
+            let classes = self.variables.iter().find(|v| v.form == TableForm::over(variable))?;
+            let regression = self.regression(vec![classes]);
+            Some((squares(&regression.left_out()?), regression.last_table()?))
+        };
+        let (one, two) = (alone(form.variable)?, alone(second)?);
+        let (form, over_first, table) = if two.0 < one.0 {
+            let turned = TableForm { variable: second, second: Some(form.variable), ..form };
+            (turned, two.1, table.transposed())
+        } else {
+            (form, one.1, table)
+        };
+        let second = form.second?;
+        let grid = DependenceGrid {
+            variable: second.name(),
+            unit: second.unit(rotary),
+            torque: table.rows(&table.torque),
+            sigma: table.rows(&table.sigma),
+            constant: table.constant,
+            x: table.nodes[0].clone(),
+            y: table.nodes[1].clone(),
+        };
+        Some(made(form, law(over_first), Some(grid)))
     }
 }
 
@@ -271,88 +275,6 @@ fn column<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     regressor.column(i).into_owned()
 }
 
-/// Regression of a residual torque on parameters and tables, with the normal equations of every log.
-struct Regression<'a> {
-    rest: &'a Rest,
-    laws: Vec<&'a Classes>,
-    normal: Vec<(DMatrix<f64>, DVector<f64>)>,
-    ridge: DMatrix<f64>,
-}
-
-/// Regressor row of a point: the row `base` without tables, then the share of every class of each table's variable around the point.
-fn row(base: &[f64], laws: &[&Classes], point: usize) -> DVector<f64> {
-    let shares = laws.iter().flat_map(|law| law.share[point]);
-    DVector::from_iterator(base.len() + CLASSES * laws.len(), base.iter().copied().chain(shares))
-}
-
-impl Regression<'_> {
-    /// Sum of the normal equations of the logs selected by `wanted`, with the prior precision.
-    fn system(&self, wanted: impl Fn(usize) -> bool) -> (DMatrix<f64>, DVector<f64>) {
-        let mut whole = (self.ridge.clone(), DVector::zeros(self.ridge.nrows()));
-        for (_, (matrix, right)) in self.normal.iter().enumerate().filter(|(log, _)| wanted(*log)) {
-            whole.0 += matrix;
-            whole.1 += right;
-        }
-        whole
-    }
-
-    fn row(&self, point: usize) -> DVector<f64> {
-        row(&self.rest.base[point], &self.laws, point)
-    }
-
-    /// Residual torque at a point after subtraction of the regression with the coefficients `values`.
-    fn left(&self, values: &DVector<f64>, point: usize) -> f64 {
-        self.rest.torque[point] - self.row(point).dot(values)
-    }
-
-    /// Residual torque of each point after subtraction of the regression fitted to all logs but the point's own, N m or N; `None` if such a fit is
-    /// singular.
-    fn left_out(&self) -> Option<Vec<f64>> {
-        let values: Vec<DVector<f64>> = (0..self.rest.logs())
-            .map(|log| {
-                let (matrix, right) = self.system(|other| other != log);
-                matrix.cholesky().map(|system| system.solve(&right))
-            })
-            .collect::<Option<_>>()?;
-        Some((0..self.rest.torque.len()).map(|i| self.left(&values[self.rest.log[i]], i)).collect())
-    }
-
-    /// Last table of the regression, fitted to the logs with `teaches`: torque by class, and standard deviation from the scatter of the blocks'
-    /// scores (sandwich estimate).
-    fn last_law(&self) -> Option<DependenceLaw> {
-        let teaches = &self.rest.teaches;
-        let (matrix, right) = self.system(|log| teaches[log]);
-        let system = matrix.cholesky()?;
-        let values = system.solve(&right);
-        let k = values.len();
-        let first = k - CLASSES;
-        let last = self.laws.last()?;
-        let mut scores = vec![DVector::<f64>::zeros(k); self.rest.blocks()];
-        let mut weight = [0.0; CLASSES];
-        for i in (0..self.rest.torque.len()).filter(|i| teaches[self.rest.log[*i]]) {
-            scores[self.rest.block[i]].axpy(self.left(&values, i), &self.row(i), 1.0);
-            (0..CLASSES).for_each(|c| weight[c] += last.share[i][c].abs());
-        }
-        let scatter = scores.iter().fold(DMatrix::zeros(k, k), |sum, s| sum + s * s.transpose());
-        let inverse = system.inverse();
-        let covariance = &inverse * scatter * &inverse;
-        let all: f64 = weight.iter().sum();
-        let mean: f64 = (0..CLASSES).map(|c| weight[c] * values[first + c]).sum::<f64>() / all;
-        let intercept = values[self.rest.base.first()?.len() - 1];
-        let constant = [mean, intercept];
-        let mut law = DependenceLaw { x: Vec::new(), torque: Vec::new(), sigma: Vec::new(), constant };
-        for (c, x) in last.mean.iter().enumerate().filter_map(|(c, x)| Some((c, (*x)?))) {
-            // Standard deviation of the class's torque less the mean over the classes, as `law.torque` is such a difference.
-            let apart = DVector::from_fn(CLASSES, |i, _| f64::from(u8::from(i == c)) - weight[i] / all);
-            let own = covariance.view((first, first), (CLASSES, CLASSES));
-            law.x.push(x);
-            law.torque.push(values[first + c] - mean);
-            law.sigma.push((apart.transpose() * own * &apart)[0].max(0.0).sqrt());
-        }
-        Some(law)
-    }
-}
-
 /// Standard deviations of all joints' commanded torques over all logs, N m or N.
 fn torques<const N: usize>(logs: &[LogResidual<N>]) -> [f64; N] {
     std::array::from_fn(|j| {
@@ -360,22 +282,6 @@ fn torques<const N: usize>(logs: &[LogResidual<N>]) -> [f64; N] {
         let mean = all().sum::<f64>() / all().count().max(1) as f64;
         rms(all().map(|tau| tau - mean))
     })
-}
-
-fn squares(x: &[f64]) -> f64 {
-    x.iter().map(|x| x * x).sum()
-}
-
-/// Decrease of the sum of squares from residuals `before` to `after`, in standard deviations from its scatter over blocks.
-fn certainty(before: &[f64], after: &[f64], rest: &Rest) -> f64 {
-    let mut gains = vec![0.0; rest.blocks()];
-    for (block, (a, b)) in rest.block.iter().zip(before.iter().zip(after)) {
-        gains[*block] += a * a - b * b;
-    }
-    let n = gains.len() as f64;
-    let mean = gains.iter().sum::<f64>() / n;
-    let variance = gains.iter().map(|g| (g - mean).powi(2)).sum::<f64>() / (n - 1.0);
-    mean * n / (n * variance).sqrt().max(f64::MIN_POSITIVE)
 }
 
 #[cfg(test)]
@@ -387,12 +293,16 @@ mod tests {
     use armgap_core::arm::TwoLink;
 
     fn found_in(logs: &[LogResidual<2>]) -> Vec<Dependence> {
-        found_among(TableForm::listed, logs)
+        found_among(&TableForm::listed, logs)
     }
 
-    fn found_among(forms: fn(&[f64], usize) -> Vec<TableForm>, logs: &[LogResidual<2>]) -> Vec<Dependence> {
+    fn found_among(
+        forms: &dyn Fn(&[f64], usize) -> Vec<TableForm>,
+        logs: &[LogResidual<2>],
+    ) -> Vec<Dependence> {
         let arm = TwoLink { gravity: 9.81, length1: 0.3 };
-        dependences(&arm, &[0.1; 9], &[0.01; 9], logs, Wanted { most: MAX_TABLES, rotary: true, forms })
+        let prior = Prior { theta: [0.1; 9], sigma: [0.01; 9], inertial: 5 };
+        dependences(&arm, &[0.1; 9], &prior, logs, Wanted { most: MAX_TABLES, rotary: true, forms })
     }
 
     /// Logs of two joints that oscillate at different rates, with a given torque on each joint and noise; `memory` is the part of the noise that
@@ -459,6 +369,32 @@ mod tests {
     }
 
     #[test]
+    fn a_torque_over_two_variables_is_a_grid_and_one_over_one_variable_is_none() {
+        let forms = |torques: &[f64], own: usize| {
+            let of_two = TableForm::over_two(torques.len(), own);
+            TableForm::listed(torques, own).into_iter().chain(of_two).collect()
+        };
+        let product = |q: f64, dq: f64| 0.4 * q * dq.abs();
+        let of = |x: &InverseDynamicsResidual<2>| {
+            let [q, dq, _] = x.motion;
+            [(2.0 * q[0]).sin(), product(q[1], dq[0])]
+        };
+        let found = found_among(&forms, &logs(0.5, |_, x| of(x)));
+        let on = |joint: usize| found.iter().find(|d| d.joint == joint).unwrap();
+        assert!(on(1).variable == "q1" && on(1).grid.is_none(), "{found:?}");
+        let grid = on(2).grid.as_ref().expect("two variables");
+        assert_eq!((on(2).variable.as_str(), grid.variable.as_str()), ("q2", "dq1"));
+        let (mut missed, mut all) = (0.0, 0.0);
+        for (x, row) in grid.x.iter().zip(&grid.torque) {
+            for (y, torque) in grid.y.iter().zip(row) {
+                missed += (torque - product(*x, *y)).powi(2);
+                all += product(*x, *y).powi(2);
+            }
+        }
+        assert!(missed < 0.1 * all, "{missed} of {all}");
+    }
+
+    #[test]
     fn a_drift_is_a_law_of_time() {
         let found = found_in(&logs(0.5, |_, x| [0.1 * x.t, 0.0]));
         assert_eq!((found[0].joint, found[0].variable.as_str()), (1, "t"));
@@ -478,9 +414,9 @@ mod tests {
             let jump = if x.t > 4.0 { 0.5 } else { -0.5 };
             [jump * x.motion[1][0].signum(), 0.5 * x.tau[1].abs() * x.motion[1][1].signum()]
         };
-        let found = found_among(TableForm::rivals, &logs(0.5, |_, x| friction(x)));
+        let found = found_among(&TableForm::rivals, &logs(0.5, |_, x| friction(x)));
         let first = |joint: usize| found.iter().find(|d| d.joint == joint + 1).map(|d| d.form);
-        let of = |joint: usize, variable| Some(TableForm { factor: Factor::Direction(joint), variable });
+        let of = |joint: usize, variable| Some(TableForm::times(Factor::Direction(joint), variable));
         assert_eq!(first(0), of(0, MotionVariable::Time), "{found:?}");
         assert_eq!(first(1), of(1, MotionVariable::Load(1)), "{found:?}");
     }

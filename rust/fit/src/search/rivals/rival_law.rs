@@ -1,8 +1,8 @@
-//! The rival of every named cause: an unnamed torque, as a table over the variable of the motion that best predicts the residual torque without the
+//! The rival of every named cause: an unnamed torque, as a table over the one or two variables of the motion that best predict the residual torque without the
 //! cause.
 //!
 //! An effect that is not in the arm is named where it imitates the unmodelled torque better than the other effects do. A table can take any form over
-//! its variable: where it explains much more of the holdout than the named effect, the form of the named effect is wrong. Further forms than results
+//! its variables: where it explains much more of the holdout than the named effect, the form of the named effect is wrong. Further forms than results
 //! list stand for friction, gains and hysteresis that the library does not have (`TableForm::rivals`).
 
 use crate::likelihood::context::{DiagnosisContext, SplitWeighting, WindowSet};
@@ -18,6 +18,16 @@ use crate::search::acceptance::MATTERS;
 use armgap_core::arm::Arm;
 use nalgebra::SVector;
 
+/// Cost on the holdout with an unnamed law in the model, which is fitted to the training logs.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Rival {
+    /// With the law in the place of a cause.
+    pub(crate) instead: f64,
+    /// With the law, estimated anew, beside the cause; none where the law explains no more than the cause or no table of its form predicts what the
+    /// cause leaves.
+    pub(crate) beside: Option<f64>,
+}
+
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
     /// Tables of a model's residual torque over one variable of the motion each, strongest first, fitted to the training logs: those that remove a
     /// considerable share of the holdout's gap, each added to the model with everything fitted again.
@@ -31,29 +41,45 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let rest = full - self.floor(weights);
         let predicts =
             |law: &Dependence| full - self.cost_beside(&model.hypothesis, law, weights) > MATTERS * rest;
-        let mut laws = self
-            .dependences(&model.hypothesis, Wanted { most: MAX_TABLES, rotary, forms: TableForm::listed });
+        let forms = |torques: &[f64], own| with_two(TableForm::listed(torques, own), own, torques.len());
+        let mut laws =
+            self.dependences(&model.hypothesis, Wanted { most: MAX_TABLES, rotary, forms: &forms });
         laws.retain(predicts);
         laws
     }
 
     /// Tables of a model's residual torque by inverse dynamics over one variable of the motion each, strongest first, fitted to the training logs.
-    fn dependences(&self, model: &Hypothesis<P>, wanted: Wanted) -> Vec<Dependence> {
+    fn dependences(&self, model: &Hypothesis<P>, wanted: Wanted<'_>) -> Vec<Dependence> {
         let of = |set: &WindowSet<N>, teaches| -> Vec<LogResidual<N>> {
             let tracks = &set.data.tracks;
             tracks.iter().filter_map(|track| LogResidual::new(&self.arm, track, model, teaches)).collect()
         };
         let mut logs = of(&self.training, true);
         logs.extend(of(&self.holdout, false));
-        dependences(&self.arm, &model.theta, &self.prior.sigma, &logs, wanted)
+        dependences(&self.arm, &model.theta, &self.prior, &logs, wanted)
     }
 
-    /// Cost on the holdout of a model with the table of torque added that best predicts the model's residual torque, of all forms that a rival may
-    /// have; none where no table predicts it.
-    pub(crate) fn rival_cost(&self, model: &Hypothesis<P>, weights: &SplitWeighting<N>) -> Option<f64> {
-        let wanted = Wanted { most: 1, rotary: true, forms: TableForm::rivals };
-        let rival = self.dependences(model, wanted).into_iter().next()?;
-        Some(self.cost_beside(model, &rival, weights))
+    /// What the unnamed law that best predicts the residual torque without a cause predicts in the cause's place and beside it; none where no table of
+    /// all forms that a rival may have predicts it. `model` is the final model, which leaves the cost `with_cause` on the holdout, `without` the same
+    /// without the cause.
+    pub(crate) fn rival(
+        &self,
+        (model, with_cause): (&Hypothesis<P>, f64),
+        without: &Hypothesis<P>,
+        weights: &SplitWeighting<N>,
+    ) -> Option<Rival> {
+        let forms = |torques: &[f64], own| with_two(TableForm::rivals(torques, own), own, torques.len());
+        let wanted = Wanted { most: 1, rotary: true, forms: &forms };
+        let law = self.dependences(without, wanted).into_iter().next()?;
+        let instead = self.cost_beside(without, &law, weights);
+        if instead >= with_cause {
+            return Some(Rival { instead, beside: None });
+        }
+        let same = |_: &[f64], joint: usize| {
+            if joint + 1 == law.joint { vec![law.form] } else { Vec::new() }
+        };
+        let beside = self.dependences(model, Wanted { forms: &same, ..wanted }).into_iter().next();
+        Some(Rival { instead, beside: beside.map(|law| self.cost_beside(model, &law, weights)) })
     }
 
     /// Cost on the holdout of a model with the torques of the table `law` added, everything fitted again to the training logs.
@@ -69,6 +95,12 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     }
 }
 
+/// Forms of tables over one variable on joint `own` (from 0) of `n`, and those over two.
+fn with_two(mut forms: Vec<TableForm>, own: usize, n: usize) -> Vec<TableForm> {
+    forms.extend(TableForm::over_two(n, own));
+    forms
+}
+
 /// The same windows of data, with the torques of `law` along the measured motion added as a table to their logs.
 fn with_torques<const N: usize>(data: &Dataset<N>, law: &Dependence) -> Dataset<N> {
     let mut data = data.clone();
@@ -80,7 +112,7 @@ fn with_torques<const N: usize>(data: &Dataset<N>, law: &Dependence) -> Dataset<
         };
         let points: Vec<MotionPoint<N>> = (0..track.len()).map(point).collect();
         let slow = slow_speeds(track, &rms_speeds(track));
-        let torques = law.form.along(&points, &slow).into_iter().map(|x| law.law.at(x)).collect();
+        let torques = law.form.along(&points, &slow).into_iter().map(|place| law.at(place)).collect();
         track.tables.resize(UNNAMED, Vec::new());
         track.tables.push(torques);
     }

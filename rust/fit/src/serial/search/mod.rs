@@ -184,7 +184,6 @@ impl Search<'_> {
 mod tests {
     use super::*;
     use crate::locate::dependence::MotionVariable;
-    use crate::locate::table_form::Factor;
     use crate::locate::variable_classes::CLASSES;
     use crate::model::hypothesis::EffectInstance;
     use crate::numeric::random::Random;
@@ -259,7 +258,7 @@ mod tests {
 
         /// Row by row; only the time has values.
         fn table_variable(&self, form: TableForm) -> Vec<[f64; 2]> {
-            let is_time = form == TableForm { factor: Factor::One, variable: MotionVariable::Time };
+            let is_time = form == TableForm::over(MotionVariable::Time);
             (0..if is_time { ROWS } else { 0 }).map(|k| [1.0, k as f64]).collect()
         }
 
@@ -432,7 +431,7 @@ mod tests {
 
     /// A torque on the second joint that depends on the time in a form that no candidate has.
     fn drift() -> Term {
-        let form = TableForm { factor: Factor::One, variable: MotionVariable::Time };
+        let form = TableForm::over(MotionVariable::Time);
         let along: Vec<[f64; 2]> = (0..ROWS).map(|k| [1.0, k as f64]).collect();
         let torques = (0..CLASSES).map(|c| if (c / 3).is_multiple_of(2) { 0.2 } else { -0.1 }).collect();
         Table::new(1, form, &along).unwrap().term().with(torques)

@@ -5,7 +5,7 @@
 //! ([`Search::evidence`]).
 
 use crate::locate::dependence::{Dependence, DependenceLaw, MotionVariable};
-use crate::locate::table_form::{Factor, TableForm};
+use crate::locate::table_form::TableForm;
 use crate::locate::variable_classes::CLASSES;
 use crate::result::verdict::ABOVE_NOISE;
 use crate::serial::constants::{MOST_TABLES, PRICE, RIVAL_FINALISTS};
@@ -24,7 +24,7 @@ impl Search<'_> {
     /// Standard deviations of all joints' torques along the training logs, N m or N.
     fn torque_deviations(&self) -> Vec<f64> {
         let deviation = |joint: usize| {
-            let form = TableForm { factor: Factor::One, variable: MotionVariable::Torque(joint) };
+            let form = TableForm::over(MotionVariable::Torque(joint));
             let values: Vec<f64> = self.training.table_variable(form).into_iter().map(|x| x[1]).collect();
             let count = values.len().max(1) as f64;
             let mean = values.iter().sum::<f64>() / count;
@@ -177,6 +177,7 @@ impl Search<'_> {
                 sigma: present.iter().map(|c| sigma(*c)).collect(),
                 constant: [-mean, 0.0],
             },
+            grid: None,
         })
     }
 }

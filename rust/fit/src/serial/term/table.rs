@@ -34,7 +34,7 @@ impl Table {
             return None;
         }
         let least = along.iter().fold(f64::INFINITY, |least, x| least.min(x[1]));
-        let edges = edges(along.iter().map(|x| x[1]).collect());
+        let edges = edges(along.iter().map(|x| x[1]).collect(), CLASSES);
         let (mut sum, mut count) = ([0.0; CLASSES], [0.0; CLASSES]);
         for [_, x] in along {
             let class = edges.partition_point(|edge| edge <= x);
@@ -75,7 +75,8 @@ impl Table {
 mod tests {
     use super::*;
 
-    const OVER_TIME: TableForm = TableForm { factor: Factor::One, variable: MotionVariable::Time };
+    const OVER_TIME: TableForm =
+        TableForm { factor: Factor::One, variable: MotionVariable::Time, second: None };
 
     #[test]
     fn classes_are_of_equal_count_and_values_beyond_them_are_in_the_outer_ones() {
@@ -111,7 +112,7 @@ mod tests {
     fn tables_over_the_own_command_change_it() {
         let of = |factor, variable| {
             let along: Vec<[f64; 2]> = (0..50).map(|k| [1.0, f64::from(k)]).collect();
-            Table::new(1, TableForm { factor, variable }, &along).unwrap().changes_command()
+            Table::new(1, TableForm::times(factor, variable), &along).unwrap().changes_command()
         };
         assert!(of(Factor::One, MotionVariable::Torque(1)) && of(Factor::Torque(1), MotionVariable::Time));
         assert!(

@@ -62,5 +62,5 @@ fn along<const N: usize>(log: &Intervals<N>, form: TableForm) -> Vec<[f64; 2]> {
         tau: SVector::from(m.tau),
     };
     let points: Vec<MotionPoint<N>> = log.middles.iter().map(point).collect();
-    form.along(&points, &log.slow)
+    form.along(&points, &log.slow).into_iter().map(|place| [place.factor, place.x]).collect()
 }

@@ -1,0 +1,313 @@
+//! Regression of a residual torque on an arm's parameters and on tables, judged by logs that it was not fitted to.
+//!
+//! A table's torques are linear parameters, whose second differences are penalised (P-splines, Eilers and Marx, Statistical Science 11, 1996): a torque
+//! that is linear in each variable costs nothing, and cells without samples take values from those around them.
+
+use crate::locate::variable_classes::Classes;
+use nalgebra::{DMatrix, DVector};
+
+/// Number of points that count as one independent point, because their errors are correlated by the low-pass filter and by the residual torque
+/// itself.
+const CORRELATED: f64 = 10.0;
+
+/// Part of a further point of zero torque by which a class is held in the table that results show: so little that the arm file's standard deviations
+/// decide what of the torque the parameters take, and enough for cells that no sample is near.
+const ANCHORED: f64 = 1e-3;
+
+/// Low-passed residual torque of one joint over all logs, with all variables that it may depend on.
+#[derive(Debug, Clone, Default)]
+pub struct Rest {
+    /// Variables that the residual torque may depend on, cut into classes.
+    pub variables: Vec<Classes>,
+    /// Residual torque at each point, N m or N.
+    pub torque: Vec<f64>,
+    /// Sum of squares, over all points, of the residual torque due to noise of the positions.
+    pub noise: f64,
+    /// Regressor row at each point without tables: torque on the joint, N m or N, due to one standard deviation (arm file) of each of the arm's
+    /// parameters, and last the constant 1.
+    pub base: Vec<Vec<f64>>,
+    /// Distance of each of the parameters behind the residual torque from the arm file's value, in standard deviations of the arm file.
+    pub away: Vec<f64>,
+    /// Index of the log that each point belongs to.
+    pub log: Vec<usize>,
+    /// Whether the torques of the tables are fitted to each log.
+    pub teaches: Vec<bool>,
+    /// Index of the block of one second that each point belongs to, counted through all logs.
+    pub block: Vec<usize>,
+}
+
+/// A table as it is fitted.
+#[derive(Debug, Clone)]
+pub struct Table {
+    /// Nodes of the first and of the second variable; the latter are none for a table over one.
+    pub nodes: [Vec<f64>; 2],
+    /// Torque at each node less the mean torque, N m or N.
+    pub torque: Vec<f64>,
+    /// Standard deviation of these, N m or N.
+    pub sigma: Vec<f64>,
+    /// Mean torque of the table, and constant beside the table, N m or N.
+    pub constant: [f64; 2],
+}
+
+impl Table {
+    /// The table with its variables exchanged.
+    pub fn transposed(self) -> Self {
+        let exchanged = |values: &[f64]| -> Vec<f64> {
+            let rows = self.rows(values);
+            (0..self.nodes[1].len()).flat_map(|k| rows.iter().map(move |row| row[k])).collect()
+        };
+        let (torque, sigma) = (exchanged(&self.torque), exchanged(&self.sigma));
+        let [first, second] = self.nodes;
+        Self { nodes: [second, first], torque, sigma, constant: self.constant }
+    }
+
+    /// Values of the cells by class of the first variable.
+    pub fn rows(&self, values: &[f64]) -> Vec<Vec<f64>> {
+        values.chunks(self.nodes[1].len().max(1)).map(<[f64]>::to_vec).collect()
+    }
+}
+
+impl Rest {
+    /// Number of blocks of one second.
+    pub fn blocks(&self) -> usize {
+        self.block.last().map_or(0, |b| b + 1)
+    }
+
+    /// Number of logs.
+    pub fn logs(&self) -> usize {
+        self.teaches.len()
+    }
+
+    /// Regression of the residual torque on the arm's parameters and on tables over the variables `laws`.
+    pub fn regression<'a>(&'a self, laws: Vec<&'a Classes>) -> Regression<'a> {
+        let own = self.base.first().map_or(0, Vec::len);
+        let ends = ends(own, &laws);
+        let k = ends.last().copied().unwrap_or(own);
+        let mut normal = vec![(DMatrix::zeros(k, k), DVector::zeros(k)); self.logs()];
+        for (i, y) in self.torque.iter().enumerate() {
+            let row = row(&self.base[i], &laws, i);
+            let (matrix, right) = &mut normal[self.log[i]];
+            matrix.ger(1.0, &row, &row, 1.0);
+            right.axpy(*y, &row, 1.0);
+        }
+        // The prior of the parameters is the arm file's; a class counts as if it had one further point, with a typical factor and zero torque.
+        let variance = self.variance();
+        let of_class = |i: usize| laws[ends.partition_point(|end| *end <= i)].factor_square;
+        let zero = DVector::from_fn(k, |i, _| if i < own { 0.0 } else { of_class(i) });
+        let of_parameter = |i: usize| if i + 1 < own { CORRELATED * variance } else { 1.0 };
+        let mut ridge =
+            DMatrix::from_diagonal(&DVector::from_fn(k, |i, _| if i < own { of_parameter(i) } else { 0.0 }));
+        // The second differences count as if one independent point had shown each of them to be zero (P-splines, Eilers and Marx 1996).
+        for (law, end) in laws.iter().zip(&ends) {
+            let (first, precision) = (end - law.count(), CORRELATED * law.factor_square);
+            for bend in law.bends() {
+                for ((a, u), (b, v)) in bend.iter().flat_map(|a| bend.iter().map(move |b| (*a, *b))) {
+                    ridge[(first + a, first + b)] += precision * u * v;
+                }
+            }
+        }
+        Regression { rest: self, laws, normal, ridge, zero: DMatrix::from_diagonal(&zero) }
+    }
+
+    /// Indices of the points of the logs that tables are fitted to.
+    fn taught(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.torque.len()).filter(|i| self.teaches[self.log[*i]])
+    }
+
+    /// Mean square of the residual torque, N^2 m^2 or N^2.
+    fn variance(&self) -> f64 {
+        squares(&self.torque) / self.torque.len().max(1) as f64
+    }
+
+    /// Decrease of the sum of squares from residuals `before` to `after`, in standard deviations from its scatter over blocks.
+    pub fn certainty(&self, before: &[f64], after: &[f64]) -> f64 {
+        let mut gains = vec![0.0; self.blocks()];
+        for (block, (a, b)) in self.block.iter().zip(before.iter().zip(after)) {
+            gains[*block] += a * a - b * b;
+        }
+        let n = gains.len() as f64;
+        let mean = gains.iter().sum::<f64>() / n;
+        let variance = gains.iter().map(|g| (g - mean).powi(2)).sum::<f64>() / (n - 1.0);
+        mean * n / (n * variance).sqrt().max(f64::MIN_POSITIVE)
+    }
+}
+
+/// Regression of a residual torque on parameters and tables, with the normal equations of every log.
+pub struct Regression<'a> {
+    rest: &'a Rest,
+    laws: Vec<&'a Classes>,
+    normal: Vec<(DMatrix<f64>, DVector<f64>)>,
+    /// Prior precision of the parameters and of the tables' second differences.
+    ridge: DMatrix<f64>,
+    /// Precision of the expectation that a class has no torque.
+    zero: DMatrix<f64>,
+}
+
+/// Regressor row of a point: the row `base` without tables, then the share of every class of each table's variable around the point.
+fn row(base: &[f64], laws: &[&Classes], point: usize) -> DVector<f64> {
+    let shares = laws.iter().flat_map(|law| &law.share[point]);
+    let width = ends(base.len(), laws).last().copied().unwrap_or(base.len());
+    DVector::from_iterator(width, base.iter().chain(shares).copied())
+}
+
+/// Indices in a regressor row behind each table's classes, the first of which follow `base` entries.
+fn ends(base: usize, laws: &[&Classes]) -> Vec<usize> {
+    let behind = |end: &mut usize, law: &&Classes| {
+        *end += law.count();
+        Some(*end)
+    };
+    laws.iter().scan(base, behind).collect()
+}
+
+impl Regression<'_> {
+    /// Sum of the normal equations of the logs selected by `wanted`.
+    fn unpenalised(&self, wanted: impl Fn(usize) -> bool) -> (DMatrix<f64>, DVector<f64>) {
+        let k = self.ridge.nrows();
+        let mut whole = (DMatrix::zeros(k, k), DVector::zeros(k));
+        for (_, (matrix, right)) in self.normal.iter().enumerate().filter(|(log, _)| wanted(*log)) {
+            whole.0 += matrix;
+            whole.1 += right;
+        }
+        whole
+    }
+
+    fn row(&self, point: usize) -> DVector<f64> {
+        row(&self.rest.base[point], &self.laws, point)
+    }
+
+    /// Residual torque at a point after subtraction of the regression with the coefficients `values`.
+    fn left(&self, values: &DVector<f64>, point: usize) -> f64 {
+        self.rest.torque[point] - self.row(point).dot(values)
+    }
+
+    /// Residual torque of each point after subtraction of the regression fitted to all logs but the point's own, N m or N; `None` if such a fit is
+    /// singular.
+    pub fn left_out(&self) -> Option<Vec<f64>> {
+        let values: Vec<DVector<f64>> = (0..self.rest.logs())
+            .map(|log| {
+                let (matrix, right) = self.unpenalised(|other| other != log);
+                (matrix + &self.ridge + &self.zero).cholesky().map(|system| system.solve(&right))
+            })
+            .collect::<Option<_>>()?;
+        Some((0..self.rest.torque.len()).map(|i| self.left(&values[self.rest.log[i]], i)).collect())
+    }
+
+    /// Last table of the regression, fitted to the logs with `teaches`, beside parameters expected at the arm file's values. All prior precisions are
+    /// those of a residual torque of which the tables explain nothing, times the share of its variance that they leave. What table and parameters can
+    /// both take is shared as the arm file's standard deviations say.
+    pub fn last_table(&self) -> Option<Table> {
+        let fitted = self.fitted(1.0)?;
+        let share = |fitted: &Fitted| (fitted.left / self.rest.variance()).min(1.0);
+        let fitted = self.fitted(share(&fitted))?;
+        let of_prior = share(&fitted);
+        let Fitted { values, without, left } = self.fitted(of_prior)?;
+        let last = self.laws.last()?;
+        let (k, classes) = (values.len(), last.count());
+        let first = k - classes;
+        let mut weight = vec![0.0; classes];
+        for i in self.rest.taught() {
+            for (weight, share) in weight.iter_mut().zip(&last.share[i]) {
+                *weight += share.abs();
+            }
+        }
+        // Covariance by the jackknife over blocks, and that due to the prior, without which a table would be too sure where the parameters may take
+        // its part and where it bends (Nychka, J. Am. Stat. Assoc. 83, 1988).
+        let (normal, _) = self.unpenalised(|log| self.rest.teaches[log]);
+        let prior = of_prior * self.held();
+        let inverse = (normal + &prior).cholesky()?.inverse();
+        let count = without.len() as f64;
+        let covariance =
+            without.iter().fold(&inverse * (CORRELATED * left * prior) * &inverse, |sum, other| {
+                let apart = other - &values;
+                sum + (count - 1.0) / count * &apart * apart.transpose()
+            });
+        let own = covariance.view((first, first), (classes, classes));
+        let all: f64 = weight.iter().sum();
+        let part = DVector::from_iterator(classes, weight.iter().map(|weight| weight / all));
+        let mean = (0..classes).map(|c| part[c] * values[first + c]).sum::<f64>();
+        let intercept = values[self.rest.base.first()?.len() - 1];
+        // Variance of the difference between a class's torque and the mean over the classes.
+        let with_mean = own * &part;
+        let of_mean = part.dot(&with_mean);
+        let sigma = |c: usize| (own[(c, c)] - 2.0 * with_mean[c] + of_mean).max(0.0).sqrt();
+        Some(Table {
+            nodes: last.nodes.clone(),
+            torque: (0..classes).map(|c| values[first + c] - mean).collect(),
+            sigma: (0..classes).map(sigma).collect(),
+            constant: [mean, intercept],
+        })
+    }
+
+    /// Prior precision of parameters and tables in a table that results show.
+    fn held(&self) -> DMatrix<f64> {
+        &self.ridge + ANCHORED * &self.zero
+    }
+
+    /// Fits to the logs with `teaches`, whole and without each block, with the prior precisions times `share`; `None` if one is singular.
+    fn fitted(&self, share: f64) -> Option<Fitted> {
+        let (normal, right) = self.unpenalised(|log| self.rest.teaches[log]);
+        let k = right.len();
+        let prior = share * self.held();
+        let away = DVector::from_fn(k, |i, _| self.rest.away.get(i).copied().unwrap_or(0.0));
+        let pull = &prior * away;
+        let solve = |normal: DMatrix<f64>, right: DVector<f64>| {
+            (normal + &prior).cholesky().map(|system| system.solve(&(right + &pull)))
+        };
+        let mut blocks: Vec<(usize, Vec<usize>)> = Vec::new();
+        for i in self.rest.taught() {
+            match blocks.last_mut().filter(|(block, _)| *block == self.rest.block[i]) {
+                Some((_, points)) => points.push(i),
+                None => blocks.push((self.rest.block[i], vec![i])),
+            }
+        }
+        let (mut without, mut left, mut count) = (Vec::new(), 0.0, 0.0);
+        for (_, points) in blocks {
+            let (mut matrix, mut vector) = (normal.clone(), right.clone());
+            for i in &points {
+                let row = self.row(*i);
+                matrix.ger(-1.0, &row, &row, 1.0);
+                vector.axpy(-self.rest.torque[*i], &row, 1.0);
+            }
+            let values = solve(matrix, vector)?;
+            left += points.iter().map(|i| self.left(&values, *i).powi(2)).sum::<f64>();
+            count += points.len() as f64;
+            without.push(values);
+        }
+        Some(Fitted { values: solve(normal, right)?, without, left: left / count })
+    }
+}
+
+/// Coefficients of a regression.
+struct Fitted {
+    /// Fitted to all logs that teach.
+    values: DVector<f64>,
+    /// Fitted without each of their blocks.
+    without: Vec<DVector<f64>>,
+    /// Mean square of the residual torque of each block under the fit without it, N^2 m^2 or N^2.
+    left: f64,
+}
+
+/// Sum of squares.
+pub fn squares(x: &[f64]) -> f64 {
+    x.iter().map(|x| x * x).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_table_with_its_variables_exchanged_has_the_same_cells() {
+        let table = Table {
+            nodes: [vec![0.0, 1.0], vec![5.0, 6.0, 7.0]],
+            torque: vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0],
+            sigma: vec![0.1, 0.2, 0.3, 0.4, 0.5, 0.6],
+            constant: [7.0, 8.0],
+        };
+        let exchanged = table.clone().transposed();
+        assert_eq!(exchanged.rows(&exchanged.torque), [vec![1.0, 4.0], vec![2.0, 5.0], vec![3.0, 6.0]]);
+        assert_eq!(exchanged.nodes[0], [5.0, 6.0, 7.0]);
+        let back = exchanged.transposed();
+        assert_eq!((back.nodes, back.torque, back.sigma), (table.nodes, table.torque, table.sigma));
+    }
+}
