@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armgap.report.words import error_text, symbol_text, unit_text
+from armgap.report.symbols import symbol_text
+from armgap.report.words import error_text, unit_text
 
 __all__ = ["AFTER", "BEFORE", "FLOOR", "MEASURED", "REFIT", "bars", "law", "lines"]
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import math
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -14,12 +13,12 @@ from armgap._renamed import old_names
 from armgap.literals import SERIAL, joint_units
 from armgap.remainder import exceeds_floor, leaves_part
 from armgap.report.pushes import many_pushes
+from armgap.report.symbols import depends_text
 from armgap.several_joints import place_text
 
 __all__ = [
     "SummaryAnswer",
     "answers",
-    "depends_text",
     "doubtful",
     "each_joint",
     "error_text",
@@ -30,7 +29,6 @@ __all__ = [
     "parameter_text",
     "percent",
     "sizes",
-    "symbol_text",
     "title",
     "unit_text",
     "value",
@@ -106,8 +104,6 @@ _OF_SERIAL_ARMS = {
     "reference_offset": "offset of the reference",
     "viscous_friction": "viscous friction other than the arm file's",
 }
-_SYMBOLS = {"q": "position", "dq": "speed", "ddq": "acceleration", "tau": "torque"}
-_SYMBOL = re.compile(r"(q|dq|ddq|tau)[0-9]+")
 _VARIABLES = {"dq": "speed", "reversal": "near a reversal", "q": "position", "tau": "torque", "t": "time"}
 
 
@@ -382,37 +378,6 @@ def _limits(data: Data, place: Data) -> str:
             return f"{text} of {whole} {unit_text(r['unit'])}".strip()
     unit = str(place["detail"]).rpartition(f"{span['to']:.3f}")[2].strip()
     return f"{text} {unit}".strip()
-
-
-def depends_text(entry: Data) -> str:
-    """Return what a torque without a name depends on: the symbol of its variable, or of both.
-
-    Parameters
-    ----------
-    entry : dict
-        One entry of a diagnosis' ``unnamed``.
-    """
-    grid = entry.get("grid")
-    return " and ".join(symbol_text(d["variable"]) for d in (entry, grid) if d)
-
-
-def symbol_text(variable: str) -> str:
-    """Return the meaning of a variable such as ``dq2``; any other text unchanged.
-
-    Examples
-    --------
-    >>> symbol_text("ddq2"), symbol_text("rate of change of tau1"), symbol_text("t")
-    ('acceleration of joint 2', 'rate of change of the torque of joint 1', 'time')
-    """
-    words = variable.split(" ")
-    symbol = next((w for w in words if _SYMBOL.fullmatch(w)), None)
-    if symbol is None:
-        return "time" if variable == "t" else variable
-    stem = symbol.rstrip("0123456789")
-    meaning = f"{_SYMBOLS[stem]} of joint {symbol[len(stem) :]}"
-    return " ".join(
-        (meaning if len(words) == 1 or w != words[-1] else f"the {meaning}") if w == symbol else w for w in words
-    )
 
 
 def variable_text(variable: str) -> str:

@@ -8,7 +8,8 @@ from typing import Any
 from armgap.report import charts
 from armgap.report.page import Bar, Cell, Drawing, Section, Table
 from armgap.report.sections.model_labels import Data, load_text, small_unit, torque_unit
-from armgap.report.words import depends_text, error_text, figure, named, percent, sizes, symbol_text, title
+from armgap.report.symbols import depends_text, symbol_text
+from armgap.report.words import error_text, figure, named, percent, sizes, title
 from armgap.several_joints import place_text
 
 __all__ = ["candidates", "evidence", "look_alikes", "ranking", "unnamed"]
