@@ -243,7 +243,8 @@ impl Regression<'_> {
         &self.ridge + ANCHORED * &self.zero
     }
 
-    /// Fits to the logs with `teaches`, whole and without each block, with the prior precisions times `share`; `None` if one is singular.
+    /// Fits to the logs with `teaches`, whole and without each block, with the prior precisions times `share`; `None` if one is singular or these logs
+    /// have no points.
     fn fitted(&self, share: f64) -> Option<Fitted> {
         let (normal, right) = self.unpenalised(|log| self.rest.teaches[log]);
         let k = right.len();
@@ -273,7 +274,8 @@ impl Regression<'_> {
             count += points.len() as f64;
             without.push(values);
         }
-        Some(Fitted { values: solve(normal, right)?, without, left: left / count })
+        let values = solve(normal, right)?;
+        (count > 0.0).then(|| Fitted { values, without, left: left / count })
     }
 }
 
