@@ -196,11 +196,13 @@ impl Regression<'_> {
     /// those of a residual torque of which the tables explain nothing, times the share of its variance that they leave. What table and parameters can
     /// both take is shared as the arm file's standard deviations say.
     pub fn last_table(&self) -> Option<Table> {
-        let fitted = self.fitted(1.0)?;
+        let whole = self.unpenalised(|log| self.rest.teaches[log]);
+        let blocks = self.blocks();
         let share = |fitted: &Fitted| (fitted.left / self.rest.variance()).min(1.0);
-        let fitted = self.fitted(share(&fitted))?;
-        let of_prior = share(&fitted);
-        let Fitted { values, without, left } = self.fitted(of_prior)?;
+        let first = self.fitted(&whole, &blocks, 1.0)?;
+        let second = self.fitted(&whole, &blocks, share(&first))?;
+        let of_prior = share(&second);
+        let Fitted { values, without, left } = self.fitted(&whole, &blocks, of_prior)?;
         let last = self.laws.last()?;
         let (k, classes) = (values.len(), last.count());
         let first = k - classes;
@@ -212,9 +214,8 @@ impl Regression<'_> {
         }
         // Covariance by the jackknife over blocks, and that due to the prior, without which a table would be too sure where the parameters may take
         // its part and where it bends (Nychka, J. Am. Stat. Assoc. 83, 1988).
-        let (normal, _) = self.unpenalised(|log| self.rest.teaches[log]);
         let prior = of_prior * self.held();
-        let inverse = (normal + &prior).cholesky()?.inverse();
+        let inverse = (whole.0 + &prior).cholesky()?.inverse();
         let count = without.len() as f64;
         let covariance =
             without.iter().fold(&inverse * (CORRELATED * left * prior) * &inverse, |sum, other| {
@@ -243,40 +244,57 @@ impl Regression<'_> {
         &self.ridge + ANCHORED * &self.zero
     }
 
-    /// Fits to the logs with `teaches`, whole and without each block, with the prior precisions times `share`; `None` if one is singular or these logs
-    /// have no points.
-    fn fitted(&self, share: f64) -> Option<Fitted> {
-        let (normal, right) = self.unpenalised(|log| self.rest.teaches[log]);
-        let k = right.len();
+    /// Normal equations of every block of the logs with `teaches`, and the indices of its points.
+    fn blocks(&self) -> Vec<Block> {
+        let mut blocks: Vec<Block> = Vec::new();
+        let mut last = None;
+        for i in self.rest.taught() {
+            if last != Some(self.rest.block[i]) {
+                let k = self.ridge.nrows();
+                blocks.push(Block { normal: (DMatrix::zeros(k, k), DVector::zeros(k)), points: Vec::new() });
+                last = Some(self.rest.block[i]);
+            }
+            let Some(Block { normal: (matrix, right), points }) = blocks.last_mut() else { continue };
+            let row = self.row(i);
+            matrix.ger(1.0, &row, &row, 1.0);
+            right.axpy(self.rest.torque[i], &row, 1.0);
+            points.push(i);
+        }
+        blocks
+    }
+
+    /// Fits to the normal equations `whole` and to these without each of `blocks`, with the prior precisions times `share`; `None` if one is singular or
+    /// there is no block.
+    fn fitted(
+        &self,
+        (normal, right): &(DMatrix<f64>, DVector<f64>),
+        blocks: &[Block],
+        share: f64,
+    ) -> Option<Fitted> {
         let prior = share * self.held();
-        let away = DVector::from_fn(k, |i, _| self.rest.away.get(i).copied().unwrap_or(0.0));
+        let away = DVector::from_fn(right.len(), |i, _| self.rest.away.get(i).copied().unwrap_or(0.0));
         let pull = &prior * away;
         let solve = |normal: DMatrix<f64>, right: DVector<f64>| {
             (normal + &prior).cholesky().map(|system| system.solve(&(right + &pull)))
         };
-        let mut blocks: Vec<(usize, Vec<usize>)> = Vec::new();
-        for i in self.rest.taught() {
-            match blocks.last_mut().filter(|(block, _)| *block == self.rest.block[i]) {
-                Some((_, points)) => points.push(i),
-                None => blocks.push((self.rest.block[i], vec![i])),
-            }
-        }
-        let (mut without, mut left, mut count) = (Vec::new(), 0.0, 0.0);
-        for (_, points) in blocks {
-            let (mut matrix, mut vector) = (normal.clone(), right.clone());
-            for i in &points {
-                let row = self.row(*i);
-                matrix.ger(-1.0, &row, &row, 1.0);
-                vector.axpy(-self.rest.torque[*i], &row, 1.0);
-            }
-            let values = solve(matrix, vector)?;
-            left += points.iter().map(|i| self.left(&values, *i).powi(2)).sum::<f64>();
-            count += points.len() as f64;
-            without.push(values);
-        }
-        let values = solve(normal, right)?;
-        (count > 0.0).then(|| Fitted { values, without, left: left / count })
+        let without: Vec<DVector<f64>> = blocks
+            .iter()
+            .map(|block| solve(normal - &block.normal.0, right - &block.normal.1))
+            .collect::<Option<_>>()?;
+        let left_of = |(block, values): (&Block, &DVector<f64>)| -> f64 {
+            block.points.iter().map(|i| self.left(values, *i).powi(2)).sum()
+        };
+        let left: f64 = blocks.iter().zip(&without).map(left_of).sum();
+        let count = blocks.iter().map(|block| block.points.len()).sum::<usize>();
+        let values = solve(normal.clone(), right.clone())?;
+        (count > 0).then(|| Fitted { values, without, left: left / count as f64 })
     }
+}
+
+/// Part of a regression that rests on the points of one block.
+struct Block {
+    normal: (DMatrix<f64>, DVector<f64>),
+    points: Vec<usize>,
 }
 
 /// Coefficients of a regression.
@@ -297,6 +315,45 @@ pub fn squares(x: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::locate::dependence::MotionVariable;
+    use crate::locate::table_form::TableForm;
+    use crate::locate::variable_classes::hats;
+    use crate::numeric::random::Random;
+
+    /// Table of the torque 2 `x` with noise, beside a parameter of whose standard deviation `x` is the torque, `away` from the arm file's value.
+    fn table_beside_parameter(away: f64) -> Table {
+        let mut random = Random(3);
+        let nodes: Vec<f64> = (0..7).map(|k| f64::from(k) / 3.0 - 1.0).collect();
+        let mut rest = Rest { away: vec![away], teaches: vec![true], ..Rest::default() };
+        let mut share = Vec::new();
+        for k in 0..1200 {
+            let x = (0.37 * f64::from(k)).sin();
+            let mut shares = vec![0.0; nodes.len()];
+            for (i, value) in hats(&nodes, x) {
+                shares[i] += value;
+            }
+            share.push(shares);
+            rest.torque.push(2.0 * x + 0.1 * random.normal());
+            rest.base.push(vec![x, 1.0]);
+            rest.log.push(0);
+            rest.block.push(usize::try_from(k / 60).unwrap());
+        }
+        let form = TableForm::over(MotionVariable::Time);
+        let classes = Classes { form, nodes: [nodes, vec![]], share, factor_square: 1.0 };
+        rest.regression(vec![&classes]).last_table().unwrap()
+    }
+
+    #[test]
+    fn what_parameter_and_table_can_both_take_is_shared_as_the_arm_file_says() {
+        for (away, slope) in [(2.0, 0.0), (0.0, 2.0), (-1.0, 3.0)] {
+            let table = table_beside_parameter(away);
+            let [first, last] = [0, 6].map(|i| table.torque[i]);
+            assert!((last - first - 2.0 * slope).abs() < 0.2, "{away}: {:?}", table.torque);
+            // The parameter is known to one standard deviation, and so is the table's slope.
+            assert!((0.8..1.2).contains(&table.sigma[6]), "{away}: {:?}", table.sigma);
+            assert!(table.sigma[3] < 0.1, "{:?}", table.sigma);
+        }
+    }
 
     #[test]
     fn a_table_with_its_variables_exchanged_has_the_same_cells() {

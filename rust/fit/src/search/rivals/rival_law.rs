@@ -1,5 +1,5 @@
-//! The rival of every named cause: an unnamed torque, as a table over the one or two variables of the motion that best predict the residual torque without the
-//! cause.
+//! The rival of every named cause: an unnamed torque, as a table over the one or two variables of the motion that best predict the residual torque
+//! without the cause.
 //!
 //! An effect that is not in the arm is named where it imitates the unmodelled torque better than the other effects do. A table can take any form over
 //! its variables: where it explains much more of the holdout than the named effect, the form of the named effect is wrong. Further forms than results
@@ -29,7 +29,7 @@ pub(crate) struct Rival {
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// Tables of a model's residual torque over one variable of the motion each, strongest first, fitted to the training logs: those that remove a
+    /// Tables of a model's residual torque over one or two variables of the motion each, strongest first, fitted to the training logs: those that remove a
     /// considerable share of the holdout's gap, each added to the model with everything fitted again.
     pub(crate) fn laws_beside(
         &self,
@@ -48,7 +48,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         laws
     }
 
-    /// Tables of a model's residual torque by inverse dynamics over one variable of the motion each, strongest first, fitted to the training logs.
+    /// Tables of a model's residual torque by inverse dynamics, strongest first, fitted to the training logs.
     fn dependences(&self, model: &Hypothesis<P>, wanted: Wanted<'_>) -> Vec<Dependence> {
         let of = |set: &WindowSet<N>, teaches| -> Vec<LogResidual<N>> {
             let tracks = &set.data.tracks;
