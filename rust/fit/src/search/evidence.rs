@@ -56,10 +56,6 @@ pub struct Evidence {
     /// torque without the cause), relative to the cost above the noise floor with the cause; none where no table predicts.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rival_gain: Option<f64>,
-    /// Rise of the holdout's cost without the cause where an unnamed law of the same form is in both models, relative to the cost above the noise floor
-    /// with the cause alone; none where the law explains no more than the cause, or no such law predicts what the cause leaves.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub gain_beside_rival: Option<f64>,
     /// Size of the effect as fitted to the holdout, relative to its size fitted to the training logs; none for an effect whose first parameter is no
     /// amplitude.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -85,12 +81,10 @@ impl Evidence {
         beyond * self.selected * odds / (1.0 + odds)
     }
 
-    /// Gap left by an unnamed law in the cause's place, relative to the gap that the cause leaves, or, where that is more, the part of the cause's gain
-    /// that the cause has beside the law: 0 to 1. A law that explains what the cause leaves is no evidence against the cause.
+    /// Gap left by an unnamed law (a table over one or two variables) in the cause's place, relative to the gap that the cause leaves: 0 to 1.
     fn left_by_rival(&self) -> f64 {
         let (Some(gain), Some(rival)) = (self.gain, self.rival_gain) else { return 1.0 };
-        let kept = self.gain_beside_rival.filter(|_| gain > 0.0).map_or(0.0, |beside| beside / gain);
-        (1.0 + gain - rival).max(kept).clamp(0.0, 1.0)
+        (1.0 + gain - rival).clamp(0.0, 1.0)
     }
 
     /// Likelihood ratio, effect in the arm over effect not in the arm, of the ratio of its sizes fitted to the holdout and to the training logs.
@@ -143,12 +137,9 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
                     // The other effects in the model keep the parameters plausible without this cause: only predicted motion can be evidence for it.
                     cause.ground = Ground::Motion;
                 }
-                let rival = || self.rival((&model.hypothesis, full), &taken_out, &last.weights);
-                if let Some(rival) = (!judged_in_training).then(rival).flatten() {
-                    cause.evidence.rival_gain = Some((bare - rival.instead) / rest);
-                    cause.evidence.gain_beside_rival =
-                        rival.beside.map(|beside| (rival.instead - beside) / rest);
-                }
+                let rival =
+                    (!judged_in_training).then(|| self.rival_cost(&taken_out, &last.weights)).flatten();
+                cause.evidence.rival_gain = rival.map(|rival| (bare - rival) / rest);
             }
             if let Some((ratio, sigma)) = size_ratio(place, model, on_holdout) {
                 (cause.evidence.size_ratio, cause.evidence.size_ratio_sigma) = (Some(ratio), Some(sigma));
@@ -228,7 +219,6 @@ mod tests {
             gain: Some(gain),
             gain_sigma: None,
             rival_gain: None,
-            gain_beside_rival: None,
             size_ratio: ratio,
             size_ratio_sigma: ratio.map(|_| 0.05),
             beyond_scatter: None,
@@ -266,19 +256,6 @@ mod tests {
         let odds = PRIOR_ODDS * 0.5_f64.powi(RIVAL_POWER);
         assert!((beside(1.5) - odds / (1.0 + odds)).abs() < 1e-12);
         assert_eq!(beside(2.5), 0.0);
-    }
-
-    #[test]
-    fn a_law_that_explains_what_a_cause_leaves_is_no_evidence_against_the_cause() {
-        let with =
-            |gain_beside_rival| Evidence { rival_gain: Some(1.8), gain_beside_rival, ..evidence(1.0, None) };
-        let alone = evidence(1.0, None).probability();
-        assert_eq!(with(Some(1.0)).probability(), alone);
-        let odds = PRIOR_ODDS * 0.6_f64.powi(RIVAL_POWER);
-        assert!((with(Some(0.6)).probability() - odds / (1.0 + odds)).abs() < 1e-12);
-        // A cause that has hardly a part beside the law is no better off than by its comparison with the law.
-        assert_eq!(with(Some(0.1)).probability(), with(None).probability());
-        assert!(with(None).probability() < 0.01);
     }
 
     #[test]

@@ -18,16 +18,6 @@ use crate::search::acceptance::MATTERS;
 use armgap_core::arm::Arm;
 use nalgebra::SVector;
 
-/// Cost on the holdout with an unnamed law in the model, which is fitted to the training logs.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Rival {
-    /// With the law in the place of a cause.
-    pub(crate) instead: f64,
-    /// With the law, estimated anew, beside the cause; none where the law explains no more than the cause or no table of its form predicts what the
-    /// cause leaves.
-    pub(crate) beside: Option<f64>,
-}
-
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
     /// Tables of a model's residual torque over one or two variables of the motion each, strongest first, fitted to the training logs: those that remove a
     /// considerable share of the holdout's gap, each added to the model with everything fitted again.
@@ -59,27 +49,13 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         dependences(&self.arm, &model.theta, &self.prior, &logs, wanted)
     }
 
-    /// What the unnamed law that best predicts the residual torque without a cause predicts in the cause's place and beside it; none where no table of
-    /// all forms that a rival may have predicts it. `model` is the final model, which leaves the cost `with_cause` on the holdout, `without` the same
-    /// without the cause.
-    pub(crate) fn rival(
-        &self,
-        (model, with_cause): (&Hypothesis<P>, f64),
-        without: &Hypothesis<P>,
-        weights: &SplitWeighting<N>,
-    ) -> Option<Rival> {
+    /// Cost on the holdout of a model with the table of torque added that best predicts the model's residual torque, of all forms that a rival may
+    /// have; none where no table predicts it.
+    pub(crate) fn rival_cost(&self, model: &Hypothesis<P>, weights: &SplitWeighting<N>) -> Option<f64> {
         let forms = |torques: &[f64], own| with_two(TableForm::rivals(torques, own), own, torques.len());
-        let wanted = Wanted { most: 1, rotary: true, forms: &forms };
-        let law = self.dependences(without, wanted).into_iter().next()?;
-        let instead = self.cost_beside(without, &law, weights);
-        if instead >= with_cause {
-            return Some(Rival { instead, beside: None });
-        }
-        let same = |_: &[f64], joint: usize| {
-            if joint + 1 == law.joint { vec![law.form] } else { Vec::new() }
-        };
-        let beside = self.dependences(model, Wanted { forms: &same, ..wanted }).into_iter().next();
-        Some(Rival { instead, beside: beside.map(|law| self.cost_beside(model, &law, weights)) })
+        let rival =
+            self.dependences(model, Wanted { most: 1, rotary: true, forms: &forms }).into_iter().next()?;
+        Some(self.cost_beside(model, &rival, weights))
     }
 
     /// Cost on the holdout of a model with the torques of the table `law` added, everything fitted again to the training logs.
