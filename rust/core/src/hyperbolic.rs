@@ -7,7 +7,7 @@ use crate::number::Number;
 use crate::real::lit;
 
 /// Argument beyond which the hyperbolic tangent is 1 in double precision.
-const TANH_SATURATION: f64 = 20.0;
+pub(crate) const TANH_SATURATION: f64 = 20.0;
 
 /// Number of doublings of the argument, which is first divided by `2^DOUBLINGS`.
 const DOUBLINGS: i32 = 5;

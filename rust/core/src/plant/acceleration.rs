@@ -46,10 +46,13 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
             for j in 0..N {
                 let hooks = self.hooks[j];
                 if self.drivetrain.brakes_motor(j, latent) {
-                    let mut x = self.point(j, t, q[j], dq[j], tau[j], loads[j]);
-                    x.other = self.sliding((j + 1) % N, dq, modes);
-                    x.memory = memory[j];
-                    rhs[j] = tau[j] - bias[j] + self.force(j, &x);
+                    rhs[j] = tau[j] - bias[j];
+                    if hooks.force {
+                        let mut x = self.point(j, t, q[j], dq[j], tau[j], loads[j]);
+                        x.other = self.sliding((j + 1) % N, dq, modes);
+                        x.memory = memory[j];
+                        rhs[j] += self.force(j, &x);
+                    }
                     continue;
                 }
                 if !(hooks.force || hooks.coulomb) {

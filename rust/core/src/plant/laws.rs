@@ -3,7 +3,8 @@
 use super::{Mode, Plant};
 use crate::arm::Arm;
 use crate::effect::JointPoint;
-use crate::real::Real;
+use crate::hyperbolic::TANH_SATURATION;
+use crate::real::{Real, lit};
 
 impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P> {
     /// State, torque `tau` and load `load`, N m (N), of joint `j` at an instant, as arguments of the effects' laws.
@@ -16,7 +17,14 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
     /// Direction in which joint `j` slides: -1, 0 or 1; a number between -1 and 1 where friction is regularised.
     #[inline]
     pub(super) fn sliding(&self, j: usize, dq: &[T; N], modes: &[Mode; N]) -> T {
-        if self.is_rounded(j) { (dq[j] / self.rounding[j]).tanh() } else { modes[j].direction() }
+        if self.is_rounded(j) { self.soft_sign(j, dq[j]) } else { modes[j].direction() }
+    }
+
+    /// Smooth sign of the velocity `dq`, rad/s (m/s), of joint `j` with regularised friction.
+    #[inline]
+    fn soft_sign(&self, j: usize, dq: T) -> T {
+        let ratio = dq / self.rounding[j];
+        if ratio.abs() < lit(TANH_SATURATION) { ratio.tanh() } else { ratio.signum() }
     }
 
     /// Coulomb level of joint `j` for sliding in `direction`, N m (N), never negative.
@@ -51,7 +59,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
     #[inline]
     pub(super) fn dry_friction(&self, j: usize, x: &JointPoint<T>, mode: Mode) -> T {
         if self.is_rounded(j) {
-            let soft = (x.dq / self.rounding[j]).tanh();
+            let soft = self.soft_sign(j, x.dq);
             return self.level(j, x, if soft < T::zero() { -T::one() } else { T::one() }) * soft;
         }
         match mode {

@@ -1,6 +1,6 @@
 //! Jacobian of the predictions by the free values, at a point of a fit, with columns reused between neighbouring points.
 
-use crate::likelihood::solve::{FitProblem, scaled_inverse};
+use crate::likelihood::solve::{Effort, FitProblem, scaled_inverse};
 use crate::likelihood::weighting::Gram;
 use crate::model::hypothesis::Hypothesis;
 use crate::predict::log_inputs::LogInputs;
@@ -28,7 +28,7 @@ impl<const N: usize> Sensitivities<N> {
     ) -> Self {
         let (residual, inputs) = problem.residual_beside(hypothesis, None);
         let all: Vec<usize> = (0..hypothesis.values().len()).collect();
-        let columns = problem.sensitivities(hypothesis, &residual, inputs.as_ref(), &all);
+        let columns = problem.sensitivities(hypothesis, &residual, inputs.as_ref(), &all, false);
         let gram = problem.weighting.gram(problem.data, &views(&columns), &residual);
         Self { columns, gram, inputs }
     }
@@ -62,8 +62,9 @@ impl<'a> Jacobian<'a> {
     pub(crate) fn new<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         problem: &FitProblem<A, N, P>,
         at: &Linearisation<N, P>,
+        effort: Effort,
     ) -> Self {
-        Self::with(problem, at, None)
+        Self::with(problem, at, None, effort)
     }
 
     /// Jacobian with the columns `known` reused for the first values, unless the computed columns are collinear with them.
@@ -71,20 +72,23 @@ impl<'a> Jacobian<'a> {
         problem: &FitProblem<A, N, P>,
         at: &Linearisation<N, P>,
         known: Option<&'a Sensitivities<N>>,
+        effort: Effort,
     ) -> Self {
-        let jacobian = Self::with(problem, at, known);
+        let jacobian = Self::with(problem, at, known, effort);
         let apart = jacobian.reused_columns() == 0 || jacobian.are_distinct();
-        if apart { jacobian } else { Self::new(problem, at) }
+        if apart { jacobian } else { Self::new(problem, at, effort) }
     }
 
     fn with<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         problem: &FitProblem<A, N, P>,
         at: &Linearisation<N, P>,
         known: Option<&'a Sensitivities<N>>,
+        effort: Effort,
     ) -> Self {
         let reused_columns = known.map_or(&[][..], |known| &known.columns);
         let rest: Vec<usize> = (reused_columns.len()..at.hypothesis.values().len()).collect();
-        let computed = problem.sensitivities(&at.hypothesis, &at.residual, at.inputs.as_ref(), &rest);
+        let (inputs, held) = (at.inputs.as_ref(), effort.holds_latent_states);
+        let computed = problem.sensitivities(&at.hypothesis, &at.residual, inputs, &rest, held);
         let gram = known.map_or_else(Gram::default, |known| known.gram.clone());
         let mut jacobian = Self { reused_columns, computed, gram, is_reused: false };
         jacobian.reuse_at(problem, at);

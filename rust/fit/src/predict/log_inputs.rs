@@ -24,11 +24,38 @@ pub struct LogInputs<const N: usize> {
     on_commands: Vec<EffectInstance>,
     /// Effects with a hysteresis state.
     with_memory: Vec<EffectInstance>,
-    /// Transmission of each joint, if any; none at all where an encoder or friction of some joint is on its motor: latent states then depend on all
-    /// values of the hypothesis.
-    transmissions: Option<[Option<Transmission<f64>>; N]>,
+    /// What the latent states depend on besides.
+    source: LatentSource<N>,
+    /// Whether hypotheses with the same torques take over the latent states, whatever else differs.
+    is_held: bool,
     torques: Arc<Vec<Option<Torques<N>>>>,
     latent: Arc<Vec<Option<Vec<LatentState<f64, N>>>>>,
+}
+
+/// What the latent states of a log depend on besides the torques that reach the joints and hysteresis.
+#[derive(Clone, PartialEq)]
+enum LatentSource<const N: usize> {
+    /// Transmission of each joint, if any, where encoders and friction of all joints are on their links.
+    Transmissions([Option<Transmission<f64>>; N]),
+    /// All values of the hypothesis, with the width of friction regularisation of each joint and the place of each effect.
+    Hypothesis { values: Vec<f64>, rounding: Vec<f64>, places: Vec<(&'static str, usize, Sides)> },
+}
+
+impl<const N: usize> LatentSource<N> {
+    fn new<A: Arm<f64, N, P>, const P: usize>(
+        hypothesis: &Hypothesis<P>,
+        plant: &Plant<f64, A, N, P>,
+    ) -> Self {
+        let drivetrain = plant.drivetrain();
+        if (0..N).all(|j| drivetrain.sides(j) == Sides::LINK) {
+            return Self::Transmissions(std::array::from_fn(|j| drivetrain.get(j).copied()));
+        }
+        Self::Hypothesis {
+            values: hypothesis.values(),
+            rounding: hypothesis.rounding.to_vec(),
+            places: hypothesis.effects.iter().map(|e| (e.law.spec().name, e.joint, e.sides)).collect(),
+        }
+    }
 }
 
 impl<const N: usize> LogInputs<N> {
@@ -44,19 +71,21 @@ impl<const N: usize> LogInputs<N> {
             hypothesis.effects.iter().filter(|e| hook(&e.law.spec().hooks)).copied().collect()
         };
         let (on_commands, with_memory) = (with(|hooks| hooks.command), with(|hooks| hooks.memory));
-        let at_links = (0..N).all(|j| plant.drivetrain().sides(j) == Sides::LINK);
-        let transmissions = at_links.then(|| std::array::from_fn(|j| plant.drivetrain().get(j).copied()));
+        let source = LatentSource::new(hypothesis, plant);
         let same_torques = known.filter(|known| are_equal(&known.on_commands, &on_commands));
         let torques = same_torques
             .map_or_else(|| Arc::new(torques(&data.tracks, hypothesis)), |known| Arc::clone(&known.torques));
         let same_latent = same_torques.filter(|known| {
-            are_equal(&known.with_memory, &with_memory)
-                && transmissions.is_some()
-                && known.transmissions == transmissions
+            known.is_held || (are_equal(&known.with_memory, &with_memory) && known.source == source)
         });
         let latent = same_latent
             .map_or_else(|| Arc::new(latent(data, plant, &torques)), |known| Arc::clone(&known.latent));
-        Self { on_commands, with_memory, transmissions, torques, latent }
+        Self { on_commands, with_memory, source, is_held: false, torques, latent }
+    }
+
+    /// The inputs, whose latent states hypotheses with the same torques take over, whatever else differs.
+    pub(crate) fn with_latent_states_held(&self) -> Self {
+        Self { is_held: true, ..self.clone() }
     }
 
     /// Torques that reach the joints at every sample of the log `track` with the index `index`.
@@ -99,4 +128,86 @@ fn latent<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         Some(latent_states(track, plant, torques[index].as_deref().unwrap_or(&track.held), last))
     };
     data.tracks.par_iter().enumerate().map(of).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use armgap_core::arm::Pendulum;
+    use armgap_core::effect::find;
+    use armgap_core::integrate::{Interval, State, StepLimits, advance_in_stable_steps};
+    use nalgebra::SVector;
+
+    const PENDULUM: Pendulum<f64> = Pendulum { gravity: 9.81 };
+
+    /// A pendulum of inertia 0.1 kg m^2 behind an elastic shaft or backlash, with encoder and friction on the motor.
+    fn hidden(name: &str, p: [f64; 3]) -> Hypothesis<4> {
+        let effect = EffectInstance::new(find(name).expect("known"), 0, p).with_sides(Sides::MOTOR);
+        Hypothesis::rigid([0.1, 1.0, 0.05, 0.1]).with(effect)
+    }
+
+    /// Four seconds of its motion under a torque of two sines, as the encoder on its motor shows it.
+    fn log(hypothesis: &Hypothesis<4>) -> Dataset<1> {
+        let plant = hypothesis.plant(&PENDULUM).expect("one effect");
+        let h = 0.002;
+        let t: Vec<f64> = (0..2000).map(|k| h * f64::from(k)).collect();
+        let tau: Vec<f64> = t.iter().map(|t| 1.2 * (5.0 * t).sin() + 0.8 * (13.0 * t).sin()).collect();
+        let mut state = State::new(SVector::zeros(), SVector::zeros());
+        let limits = StepLimits { near_standstill: 16, elsewhere: 8 };
+        let mut q = Vec::new();
+        for (t, tau) in t.iter().zip(&tau) {
+            q.push(state.q[0] + state.latent.deflection[0]);
+            let interval = Interval { t: *t, h, torque: &[InputSegment::held(*tau)] };
+            let rates = plant.step_rates(&state.q);
+            advance_in_stable_steps(&plant, &mut state, &interval, &rates, limits);
+        }
+        Dataset::new(vec![Track::new("", &t, &q, &tau, Some([1e-5]))], 0.25)
+    }
+
+    fn inputs(data: &Dataset<1>, of: &Hypothesis<4>, known: Option<&LogInputs<1>>) -> LogInputs<1> {
+        LogInputs::new(data, of, &of.plant(&PENDULUM).expect("one effect"), known)
+    }
+
+    #[test]
+    fn latent_states_are_shared_by_equal_hypotheses_alone_unless_they_are_held() {
+        let here = hidden("joint_elasticity", [60.0, 0.05, 0.02]);
+        let data = log(&here);
+        let known = inputs(&data, &here, None);
+        let is_shared = |of: &Hypothesis<4>, known: &LogInputs<1>| {
+            Arc::ptr_eq(&inputs(&data, of, Some(known)).latent, &known.latent)
+        };
+        assert!(known.latent(0).is_some() && is_shared(&here, &known));
+        let mut heavier = here.clone();
+        heavier.theta[0] *= 1.01;
+        let at_link = Hypothesis { effects: vec![here.effects[0].with_sides(Sides::LINK)], ..here.clone() };
+        for other in [&heavier, &hidden("joint_elasticity", [61.0, 0.05, 0.02]), &at_link] {
+            assert!(!is_shared(other, &known));
+        }
+        assert!(is_shared(&heavier, &known.with_latent_states_held()));
+    }
+
+    #[test]
+    fn sensitivities_to_the_arm_are_nearly_those_with_latent_states_held() {
+        for (name, p) in [("joint_elasticity", [200.0, 0.05, 0.02]), ("backlash", [0.03, 0.1, 0.0])] {
+            let here = hidden(name, p);
+            let data = log(&here);
+            let offsets = data.zero_offsets();
+            let (before, known) = data.predict_beside(&PENDULUM, &here, &offsets, None);
+            let held = known.expect("one effect").with_latent_states_held();
+            for i in 0..4 {
+                let mut values = here.values();
+                let step = 1e-6 * values[i];
+                values[i] += step;
+                let column = |known: Option<&LogInputs<1>>| -> Vec<f64> {
+                    let moved = here.with_values(&values);
+                    let (after, _) = data.predict_beside(&PENDULUM, &moved, &offsets, known);
+                    after.iter().zip(&before).map(|(a, b)| (a - b) / step).collect()
+                };
+                let (exact, held) = (column(None), column(Some(&held)));
+                let length = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
+                let apart: Vec<f64> = exact.iter().zip(&held).map(|(a, b)| a - b).collect();
+                assert!(length(&apart) < 0.1 * length(&exact));
+            }
+        }
+    }
 }
