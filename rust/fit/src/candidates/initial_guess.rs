@@ -140,7 +140,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         Screening { candidates, tests, jacobian, traces, own_traces }
     }
 
-    /// Score tests of all candidates around a fit, by the traces `known` of an earlier node where there are some.
+    /// Score tests of all candidates around a fit, by the traces `known` of an earlier node where there are some, also beside other transmissions.
     pub(crate) fn screened_roughly(
         &self,
         fit: &Fit<P>,
@@ -151,8 +151,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let problem = self.problem(&weights.training);
         let jacobian = problem.jacobian(&fit.hypothesis);
         let point = TestPoint::new(&problem, &fit.hypothesis, &jacobian);
-        let known = Some(known).filter(|known| known.hold_beside(&fit.hypothesis));
-        let earlier = |c: &EffectInstance| known.and_then(|k| k.whitened(c, &weights.training.scale));
+        let earlier = |c: &EffectInstance| known.whitened(c, &weights.training.scale);
         let trace = |c: &EffectInstance| earlier(c).unwrap_or_else(|| point.trace(c));
         let traces: Vec<Vec<f64>> = candidates.par_iter().map(trace).collect();
         point.tests(&candidates, &traces)

@@ -19,11 +19,15 @@ use rayon::prelude::*;
 /// 1e-12, so a forward difference is good to 1e-6.
 const RELATIVE_STEP: f64 = 1e-6;
 
+/// Largest error of the predicted decrease of the cost, relative to the decrease that ends a search, after which the Jacobian may end the search
+/// at the next point.
+const MAX_DECREASE_ERROR: f64 = 0.5;
+
 /// Decrease of the cost predicted by a reused Jacobian, relative to the decrease that ends a search, below which the search ends.
 const MIN_PREDICTED_DECREASE: f64 = 0.1;
 
-/// Largest error of the predicted decrease of the cost, relative to the predicted decrease, after a step at which the Jacobian of the point before is
-/// kept for the next one: of columns of a neighbouring hypothesis alone where it has some.
+/// Largest error of the predicted decrease of the cost, relative to the predicted decrease, at which Jacobian columns of a neighbouring hypothesis
+/// are kept, or the whole Jacobian of an earlier point of a search that does not end on it.
 const SERVES: f64 = 0.25;
 
 /// Effort of a search for the minimum of the cost: limits of iterations and convergence.
@@ -33,15 +37,19 @@ pub struct Effort {
     pub iterations: usize,
     /// Relative decrease of the cost by an iteration below which the search ends.
     pub enough: f64,
+    /// Whether the Jacobian of an earlier point may end the search.
+    pub ends_on_reused: bool,
     /// Whether derivatives by the arm's own parameters leave out that these change latent states before the windows begin.
     pub holds_latent_states: bool,
 }
 
 impl Effort {
     /// Effort of a rough fit, enough to rank candidates.
-    pub const ROUGH: Self = Self { iterations: 4, enough: 1e-2, holds_latent_states: true };
+    pub const ROUGH: Self =
+        Self { iterations: 4, enough: 1e-2, ends_on_reused: true, holds_latent_states: true };
     /// Effort of a full fit, to the minimum of the cost.
-    pub const FULL: Self = Self { iterations: 15, enough: 1e-4, holds_latent_states: false };
+    pub const FULL: Self =
+        Self { iterations: 15, enough: 1e-4, ends_on_reused: false, holds_latent_states: false };
 }
 
 /// Normal prior of the arm's parameters, independent for each parameter.
@@ -134,8 +142,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> FitProblem<'_, A, N, P> 
     }
 
     /// Whitened sensitivities of the prediction to the free values with indices `which`, given the residual at `hypothesis` and the inputs of the
-    /// logs there. With `held`, those to the arm's own parameters leave out that these change latent states before the windows begin: of theta1 by 7 %
-    /// for a shaft of 12 Hz with encoder and friction on the motor, by 23 % for one of 7 Hz.
+    /// logs there. With `held`, those to the arm's own parameters leave out that these change latent states before the windows begin: of theta1 by
+    /// 7 % for a shaft of 12 Hz with encoder and friction on the motor, by 23 % for one of 7 Hz.
     pub(crate) fn sensitivities(
         &self,
         hypothesis: &Hypothesis<P>,
@@ -210,7 +218,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> FitProblem<'_, A, N, P> 
     }
 
     /// Minimises the cost from `initial_guess`, reusing the Jacobian columns `known` of a neighbouring hypothesis for the first values as long as the
-    /// cost falls as these columns predict. Without such columns the Jacobian of an earlier point is reused as long as the cost falls as it predicts.
+    /// cost falls as these columns predict. The Jacobian of an earlier point is reused too, by a full fit as long as the cost falls as it predicts,
+    /// but for its end.
     pub fn solve_reusing(
         &self,
         initial_guess: &Hypothesis<P>,
@@ -233,7 +242,10 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> FitProblem<'_, A, N, P> 
                 let change = DVector::from_fn(now.len(), |i, _| values[i] - now[i]);
                 let foreseen = change.dot(&(2.0 * &gradient - &normal * &change));
                 if jacobian.is_reused && foreseen < MIN_PREDICTED_DECREASE * effort.enough * at.cost() {
-                    break 'search;
+                    if effort.ends_on_reused {
+                        break 'search;
+                    }
+                    break;
                 }
                 let trial = Linearisation::new(self, at.hypothesis.with_values(&values), at.inputs.as_ref());
                 if trial.cost() < at.cost() {
@@ -251,14 +263,23 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> FitProblem<'_, A, N, P> 
             match fall {
                 None if !jacobian.is_current() => jacobian = Jacobian::new(self, &at, effort),
                 Some((fall, foreseen)) if fall > enough => {
-                    let serves = (fall - foreseen).abs() < SERVES * foreseen;
-                    if !serves {
-                        jacobian = Jacobian::new(self, &at, effort);
-                    } else if jacobian.reused_columns() > 0 {
+                    let missed = (fall - foreseen).abs();
+                    let serves = missed < SERVES * foreseen;
+                    let is_kept = if effort.ends_on_reused {
+                        missed < MAX_DECREASE_ERROR * enough
+                    } else {
+                        serves && jacobian.reused_columns() == 0
+                    };
+                    if is_kept {
+                        jacobian.reuse_at(self, &at);
+                    } else if serves && jacobian.reused_columns() > 0 {
                         jacobian = Jacobian::reusing(self, &at, known, effort);
                     } else {
-                        jacobian.reuse_at(self, &at);
+                        jacobian = Jacobian::new(self, &at, effort);
                     }
+                }
+                Some(_) if jacobian.is_reused && !effort.ends_on_reused => {
+                    jacobian = Jacobian::new(self, &at, effort);
                 }
                 _ => break,
             }
