@@ -165,3 +165,17 @@ def test_a_push_too_light_for_the_residual_torque_is_found_in_the_window_it_move
         estimate = cause.parameters[name]
         assert abs(estimate.value - value) < 3.0 * estimate.sigma
         assert estimate.value == pytest.approx(value, rel=0.03)
+
+
+def test_a_hit_of_two_samples_is_a_push_on_an_arm_without_impacts() -> None:
+    arm = Arm.read(CASE_FOLDER / "arm.toml")
+    t = np.arange(2400) * arm.sample_period
+    hit = Effect("external_pulse", 2, {"impulse": 0.05, "time": 3.3, "duration": 0.004})
+    training, holdout = (
+        simulate(arm, t, sines(t, seed), effects=effects, noise=1e-5, seed=seed)
+        for seed, effects in ((1, [hit]), (2, []))
+    )
+    [cause] = diagnose(training, arm, holdout=holdout).causes
+    assert (cause.effect, cause.joint) == ("external_pulse", 2)
+    assert cause.parameters["impulse"].value == pytest.approx(0.05, rel=0.02)
+    assert cause.parameters["time"].value == pytest.approx(3.3, abs=2e-3)
