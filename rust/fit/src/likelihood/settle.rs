@@ -30,7 +30,7 @@ struct Rounds<const N: usize, const P: usize> {
     /// Scale of each joint's residual, rad or m.
     scale: [f64; N],
     zeros: EncoderZeros<N>,
-    /// Jacobian of the last fit, if any; the next round begins where that fit ended.
+    /// Jacobian of the last fit, if any.
     jacobian: Option<Sensitivities<N>>,
 }
 
@@ -177,11 +177,9 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         self.progress.begin(Phase::Refit, MAX_ROUNDS + 1);
         let (mut last, mut agree) = (first, false);
         loop_rounds(|round| {
-            let Rounds { hypothesis, scale, zeros, jacobian } = &last;
+            let Rounds { hypothesis, scale, zeros, .. } = &last;
             let weighting = self.training_weighting(hypothesis, *scale, zeros, with_zeros);
-            let problem = self.problem(&weighting);
-            let known = jacobian.as_ref().map(|known| known.under(&problem));
-            let (fit, jacobian) = problem.solve_keeping(hypothesis, Effort::ROUGH, known.as_ref());
+            let (fit, jacobian) = self.problem(&weighting).solve_keeping(hypothesis, Effort::ROUGH, None);
             let next = self.residual_scale(&weighting, &fit.hypothesis);
             agree = (0..N).all(|j| (next[j] / scale[j]).max(scale[j] / next[j]) < SETTLED_SCALE_RATIO);
             let (zeros, jacobian) = (weighting.zeros.clone(), Some(jacobian));
