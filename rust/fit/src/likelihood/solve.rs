@@ -37,19 +37,18 @@ pub struct Effort {
     pub iterations: usize,
     /// Relative decrease of the cost by an iteration below which the search ends.
     pub enough: f64,
-    /// Whether columns of a neighbouring hypothesis may end the search.
-    pub ends_on_neighbour: bool,
+    /// Whether the fit only ranks candidates: columns of a neighbouring hypothesis may end it, and as its iterations are few, the Jacobian of an earlier
+    /// point is kept only after steps that it predicted as well as the end of a search needs.
+    pub is_rough: bool,
     /// Whether derivatives by the arm's own parameters leave out that these change latent states before the windows begin.
     pub holds_latent_states: bool,
 }
 
 impl Effort {
     /// Effort of a rough fit, enough to rank candidates.
-    pub const ROUGH: Self =
-        Self { iterations: 4, enough: 1e-2, ends_on_neighbour: true, holds_latent_states: true };
+    pub const ROUGH: Self = Self { iterations: 4, enough: 1e-2, is_rough: true, holds_latent_states: true };
     /// Effort of a full fit, to the minimum of the cost.
-    pub const FULL: Self =
-        Self { iterations: 15, enough: 1e-4, ends_on_neighbour: false, holds_latent_states: false };
+    pub const FULL: Self = Self { iterations: 15, enough: 1e-4, is_rough: false, holds_latent_states: false };
 }
 
 /// Normal prior of the arm's parameters, independent for each parameter.
@@ -295,16 +294,16 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> FitProblem<'_, A, N, P> 
             };
             let missed = (fall - foreseen).abs();
             is_exact = missed < MAX_DECREASE_ERROR * enough;
-            let may_end = jacobian.is_current()
-                || effort.ends_on_neighbour
-                || (is_exact && jacobian.reused_columns() == 0);
+            let may_end =
+                jacobian.is_current() || effort.is_rough || (is_exact && jacobian.reused_columns() == 0);
             if fall <= enough && may_end {
                 break;
             }
             let serves = missed < SERVES * foreseen && fall > enough;
-            if serves && (is_exact || jacobian.reused_columns() == 0) {
+            let is_kept = if effort.is_rough { is_exact } else { serves && jacobian.reused_columns() == 0 };
+            if is_kept && fall > enough {
                 jacobian.reuse_at(self, &at);
-            } else if serves {
+            } else if serves && jacobian.reused_columns() > 0 {
                 jacobian = Jacobian::reusing(self, &at, known, effort);
             } else {
                 jacobian = Jacobian::new(self, &at, effort);
