@@ -11,12 +11,9 @@ use armgap_core::arm::Arm;
 const COLLINEAR_BELOW: f64 = 0.05;
 
 /// Jacobian of the predictions by all free values of a hypothesis, with the inner products of its columns under one weighting.
-#[derive(Clone)]
 pub struct Sensitivities<const N: usize> {
     /// Whitened Jacobian columns, one for each free value.
     pub(crate) columns: Vec<Vec<f64>>,
-    /// Scales of the residual, rad or m, that the columns are divided by.
-    scale: [f64; N],
     /// Inner products of the columns.
     gram: Gram,
     /// Inputs of the logs under the hypothesis.
@@ -33,19 +30,7 @@ impl<const N: usize> Sensitivities<N> {
         let all: Vec<usize> = (0..hypothesis.values().len()).collect();
         let columns = problem.sensitivities(hypothesis, &residual, inputs.as_ref(), &all, false);
         let gram = problem.weighting.gram(problem.data, &views(&columns), &residual);
-        Self { columns, scale: problem.weighting.scale, gram, inputs }
-    }
-
-    /// The same Jacobian under the weighting of another fit to the same windows.
-    pub(crate) fn under<A: Arm<f64, N, P>, const P: usize>(&self, problem: &FitProblem<A, N, P>) -> Self {
-        let mut columns = self.columns.clone();
-        let ratio: [f64; N] = std::array::from_fn(|j| self.scale[j] / problem.weighting.scale[j]);
-        for column in &mut columns {
-            column.iter_mut().zip(ratio.iter().cycle()).for_each(|(value, ratio)| *value *= ratio);
-        }
-        let none = vec![0.0; problem.measured.len()];
-        let gram = problem.weighting.gram(problem.data, &views(&columns), &none);
-        Self { columns, scale: problem.weighting.scale, gram, inputs: self.inputs.clone() }
+        Self { columns, gram, inputs }
     }
 
     /// Inner products of the columns and another residual.
@@ -126,16 +111,6 @@ impl<'a> Jacobian<'a> {
         self.reused_columns() == 0 && !self.is_reused
     }
 
-    /// The Jacobian of a fit, for fits that begin where it ended; `inputs` are those of the logs there.
-    pub(crate) fn kept<A: Arm<f64, N, P>, const N: usize, const P: usize>(
-        self,
-        problem: &FitProblem<A, N, P>,
-        inputs: Option<LogInputs<N>>,
-    ) -> Sensitivities<N> {
-        let columns = self.reused_columns.iter().cloned().chain(self.computed).collect();
-        Sensitivities { columns, scale: problem.weighting.scale, gram: self.gram, inputs }
-    }
-
     /// Number of Jacobian columns reused from a neighbouring point.
     pub(crate) fn reused_columns(&self) -> usize {
         self.reused_columns.len()
@@ -181,87 +156,5 @@ impl<const N: usize, const P: usize> Linearisation<N, P> {
 
     pub(crate) fn cost(&self) -> f64 {
         self.data_cost + self.prior_cost
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use crate::likelihood::scale::Scales;
-    use crate::likelihood::solve::{Effort, Fit, FitProblem, Prior};
-    use crate::likelihood::weighting::Weighting;
-    use crate::log::track::Track;
-    use crate::model::hypothesis::Hypothesis;
-    use crate::predict::window::Dataset;
-    use crate::progress::{Control, ProgressReporter};
-    use armgap_core::arm::Pendulum;
-    use armgap_core::effect::InputSegment;
-    use armgap_core::integrate::{Interval, State, advance};
-    use nalgebra::SVector;
-    use std::sync::Arc;
-
-    const PENDULUM: Pendulum<f64> = Pendulum { gravity: 9.81 };
-    /// Inertia, gravity torque, viscous and Coulomb friction of a pendulum, SI.
-    const TRUE: [f64; 4] = [0.1, 1.0, 0.05, 0.1];
-    const FILE: [f64; 4] = [0.12, 0.9, 0.08, 0.07];
-
-    /// Four seconds of motion under a torque of two sines.
-    fn log() -> Dataset<1> {
-        let truth = Hypothesis::rigid(TRUE);
-        let plant = truth.plant(&PENDULUM).expect("no effects");
-        let h = 0.002;
-        let t: Vec<f64> = (0..2000).map(|k| h * f64::from(k)).collect();
-        let tau: Vec<f64> = t.iter().map(|t| 1.2 * (5.0 * t).sin() + 0.8 * (13.0 * t).sin()).collect();
-        let mut state = State::new(SVector::zeros(), SVector::zeros());
-        let mut q = Vec::new();
-        for (t, tau) in t.iter().zip(&tau) {
-            q.push(state.q[0]);
-            advance(&plant, &mut state, &Interval { t: *t, h, torque: &[InputSegment::held(*tau)] }, 1);
-        }
-        Dataset::new(vec![Track::new("", &t, &q, &tau, Some([1e-5]))], 0.25)
-    }
-
-    /// Weighting of the log around a model, with the residual scale `scale`, rad.
-    fn weighting(data: &Dataset<1>, model: &Hypothesis<4>, scale: f64) -> Weighting<1> {
-        let offsets = data.zero_offsets();
-        let predicted = data.predict(&PENDULUM, model, &offsets);
-        Weighting::new(data, &PENDULUM, model, [scale], offsets, &predicted)
-    }
-
-    #[test]
-    fn a_full_fit_from_a_jacobian_of_another_weighting_ends_on_its_own_at_the_same_minimum() {
-        let data = log();
-        let measured = data.measured();
-        let prior = Prior { theta: FILE, sigma: [0.05; 4], inertial: 2 };
-        let scales = Scales::new(&PENDULUM, &FILE, &data.tracks, 9.81, None);
-        let progress = ProgressReporter::new(Arc::new(|_| Control::Go));
-        let under = |weighting| FitProblem {
-            arm: &PENDULUM,
-            data: &data,
-            measured: &measured,
-            weighting,
-            prior: &prior,
-            scales: &scales,
-            progress: &progress,
-        };
-        let coarse = weighting(&data, &Hypothesis::rigid(FILE), 1e-2);
-        let (rough, kept) = under(&coarse).solve_keeping(&Hypothesis::rigid(FILE), Effort::ROUGH, None);
-        let fine = weighting(&data, &rough.hypothesis, 1e-4);
-        let problem = under(&fine);
-        let known = kept.under(&problem);
-        let from = |known| problem.solve_reusing(&rough.hypothesis, Effort::FULL, known);
-        let (with, without): (Fit<4>, Fit<4>) = (from(Some(&known)), from(None));
-        assert!(with.own_jacobian);
-        for i in 0..4 {
-            let apart = (with.hypothesis.theta[i] - without.hypothesis.theta[i]).abs();
-            assert!(apart < 0.05 * without.sigma(i), "{i}: {apart} against {}", without.sigma(i));
-            assert!((with.sigma(i) / without.sigma(i) - 1.0).abs() < 0.05, "{i}");
-        }
-        // The columns alone say what a rollout says, in units of the new scale.
-        let own = problem.jacobian(&rough.hypothesis);
-        for (a, b) in known.columns.iter().zip(&own.columns) {
-            let square = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>();
-            let apart: Vec<f64> = a.iter().zip(b).map(|(a, b)| a - b).collect();
-            assert!(square(&apart) < 0.1 * square(b));
-        }
     }
 }

@@ -2,7 +2,6 @@
 
 use crate::likelihood::context::{DiagnosisContext, SplitWeighting};
 use crate::likelihood::encoder_zero::EncoderZeros;
-use crate::likelihood::jacobian::Sensitivities;
 use crate::likelihood::solve::{Effort, Fit};
 use crate::likelihood::weighting::Weighting;
 use crate::model::hypothesis::Hypothesis;
@@ -30,14 +29,12 @@ struct Rounds<const N: usize, const P: usize> {
     /// Scale of each joint's residual, rad or m.
     scale: [f64; N],
     zeros: EncoderZeros<N>,
-    /// Jacobian of the last fit, if any.
-    jacobian: Option<Sensitivities<N>>,
 }
 
 impl<const N: usize, const P: usize> Rounds<N, P> {
     /// First round from a model and scales, without encoder zeros.
     fn new(start: &Hypothesis<P>, scale: [f64; N]) -> Self {
-        Self { hypothesis: start.clone(), scale, zeros: EncoderZeros::none(), jacobian: None }
+        Self { hypothesis: start.clone(), scale, zeros: EncoderZeros::none() }
     }
 }
 
@@ -48,8 +45,6 @@ struct Settled<const N: usize, const P: usize> {
     scale: [f64; N],
     /// Weighting of the training windows with these scales.
     weighting: Weighting<N>,
-    /// Jacobian of the last fit.
-    jacobian: Option<Sensitivities<N>>,
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
@@ -82,7 +77,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             // Fits are compared below, and by checks of the input: with scales from the noise, a wrong unit of noisy torques was not found.
             let first = Rounds::new(&from, self.rough_scale(&from));
             let settled = self.weighted(self.reweighted_until_settled(first, with_zeros).0, with_zeros);
-            let fit = self.fitted(&settled);
+            let fit = self.problem(&settled.weighting).solve(&settled.hypothesis, Effort::FULL);
             let missed = self.missed(&fit.hypothesis, &settled.weighting.zeros);
             (from, fit, missed)
         };
@@ -110,29 +105,9 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     pub(crate) fn settled_next_to(&self, start: &Hypothesis<P>, around: &Weighting<N>) -> Fit<P> {
         let with_zeros = !around.zeros.recordings.is_empty();
         let first = Rounds { zeros: around.zeros.clone(), ..Rounds::new(start, around.scale) };
-        self.fitted(&self.weighted(self.reweighted_until_settled(first, with_zeros).0, with_zeros))
-    }
-
-    /// Full fit to the training windows under the weighting of a settled model.
-    fn fitted(&self, settled: &Settled<N, P>) -> Fit<P> {
-        let problem = self.problem(&settled.weighting);
-        let known = settled.jacobian.as_ref().map(|known| known.under(&problem));
-        problem.solve_reusing(&settled.hypothesis, Effort::FULL, known.as_ref())
-    }
-
-    /// Weights of the windows after fits of the model and re-estimates of the residual scales as in [`Self::settle`].
-    pub(crate) fn settled_weights(&self, start: &Hypothesis<P>, scale: [f64; N]) -> SplitWeighting<N> {
-        let with_zeros = EncoderZeros::can_be_told_from(&self.training.data);
-        let settled = self.settled_weighting(start, scale, with_zeros);
-        let holdout = self.holdout_weighting(&settled);
-        SplitWeighting { training: settled.weighting, holdout }
-    }
-
-    /// Weighting of the holdout windows around a settled model.
-    fn holdout_weighting(&self, settled: &Settled<N, P>) -> Weighting<N> {
-        let Settled { hypothesis, scale, weighting, .. } = settled;
-        let zeros = self.zeros_beside(&self.holdout, hypothesis, *scale, &weighting.zeros);
-        self.weighting(&self.holdout, hypothesis, *scale, &zeros)
+        let Settled { hypothesis, weighting, .. } =
+            self.weighted(self.reweighted_until_settled(first, with_zeros).0, with_zeros);
+        self.problem(&weighting).solve(&hypothesis, Effort::FULL)
     }
 
     fn settled(
@@ -141,9 +116,15 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         scale: [f64; N],
         with_zeros: bool,
     ) -> (Fit<P>, SplitWeighting<N>) {
-        let settled = self.settled_weighting(start, scale, with_zeros);
-        let (holdout, fit) = rayon::join(|| self.holdout_weighting(&settled), || self.fitted(&settled));
-        (fit, SplitWeighting { training: settled.weighting, holdout })
+        let Settled { hypothesis, scale, weighting: training } =
+            self.settled_weighting(start, scale, with_zeros);
+        let holdout = || {
+            let zeros = self.zeros_beside(&self.holdout, &hypothesis, scale, &training.zeros);
+            self.weighting(&self.holdout, &hypothesis, scale, &zeros)
+        };
+        let fit = || self.problem(&training).solve(&hypothesis, Effort::FULL);
+        let (holdout, fit) = rayon::join(holdout, fit);
+        (fit, SplitWeighting { training, holdout })
     }
 
     /// Model, residual scales and weighting of the training windows after alternate fits and re-estimates of the scales.
@@ -167,26 +148,26 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
 
     /// The model and scales of the last round with the weighting of the training windows around them.
     fn weighted(&self, last: Rounds<N, P>, with_zeros: bool) -> Settled<N, P> {
-        let Rounds { hypothesis, scale, zeros, jacobian } = last;
+        let Rounds { hypothesis, scale, zeros } = last;
         let weighting = self.training_weighting(&hypothesis, scale, &zeros, with_zeros);
-        Settled { hypothesis, scale, weighting, jacobian }
+        Settled { hypothesis, scale, weighting }
     }
 
     /// Alternate fits to the training windows and re-estimates of the scales from `first`, and whether both agree after at most `MAX_ROUNDS`.
     fn reweighted_until_settled(&self, first: Rounds<N, P>, with_zeros: bool) -> (Rounds<N, P>, bool) {
         self.progress.begin(Phase::Refit, MAX_ROUNDS + 1);
-        let (mut last, mut agree) = (first, false);
+        let (Rounds { mut hypothesis, mut scale, mut zeros }, mut agree) = (first, false);
         loop_rounds(|round| {
-            let Rounds { hypothesis, scale, zeros, .. } = &last;
-            let weighting = self.training_weighting(hypothesis, *scale, zeros, with_zeros);
-            let (fit, jacobian) = self.problem(&weighting).solve_keeping(hypothesis, Effort::ROUGH, None);
+            let weighting = self.training_weighting(&hypothesis, scale, &zeros, with_zeros);
+            zeros.clone_from(&weighting.zeros);
+            let fit = self.problem(&weighting).solve(&hypothesis, Effort::ROUGH);
             let next = self.residual_scale(&weighting, &fit.hypothesis);
+            hypothesis = fit.hypothesis.clone();
             agree = (0..N).all(|j| (next[j] / scale[j]).max(scale[j] / next[j]) < SETTLED_SCALE_RATIO);
-            let (zeros, jacobian) = (weighting.zeros.clone(), Some(jacobian));
-            last = Rounds { hypothesis: fit.hypothesis, scale: next, zeros, jacobian };
+            scale = next;
             agree || round == MAX_ROUNDS
         });
-        (last, agree)
+        (Rounds { hypothesis, scale, zeros }, agree)
     }
 
     /// Geometric mean over training windows and joints of the RMS prediction error from measured initial states, relative to the noise and counted as

@@ -27,7 +27,7 @@ const MAX_DECREASE_ERROR: f64 = 0.5;
 const MIN_PREDICTED_DECREASE: f64 = 0.1;
 
 /// Largest error of the predicted decrease of the cost, relative to the predicted decrease, at which Jacobian columns of a neighbouring hypothesis
-/// are kept, or the whole Jacobian of an earlier point of the search.
+/// are kept, or the whole Jacobian of an earlier point of a search that does not end on it.
 const SERVES: f64 = 0.25;
 
 /// Effort of a search for the minimum of the cost: limits of iterations and convergence.
@@ -37,18 +37,19 @@ pub struct Effort {
     pub iterations: usize,
     /// Relative decrease of the cost by an iteration below which the search ends.
     pub enough: f64,
-    /// Whether the fit only ranks candidates: columns of a neighbouring hypothesis may end it, and as its iterations are few, the Jacobian of an earlier
-    /// point is kept only after steps that it predicted as well as the end of a search needs.
-    pub is_rough: bool,
+    /// Whether the Jacobian of an earlier point may end the search.
+    pub ends_on_reused: bool,
     /// Whether derivatives by the arm's own parameters leave out that these change latent states before the windows begin.
     pub holds_latent_states: bool,
 }
 
 impl Effort {
     /// Effort of a rough fit, enough to rank candidates.
-    pub const ROUGH: Self = Self { iterations: 4, enough: 1e-2, is_rough: true, holds_latent_states: true };
+    pub const ROUGH: Self =
+        Self { iterations: 4, enough: 1e-2, ends_on_reused: true, holds_latent_states: true };
     /// Effort of a full fit, to the minimum of the cost.
-    pub const FULL: Self = Self { iterations: 15, enough: 1e-4, is_rough: false, holds_latent_states: false };
+    pub const FULL: Self =
+        Self { iterations: 15, enough: 1e-4, ends_on_reused: false, holds_latent_states: false };
 }
 
 /// Normal prior of the arm's parameters, independent for each parameter.
@@ -216,46 +217,20 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> FitProblem<'_, A, N, P> 
         self.solve_reusing(initial_guess, effort, None)
     }
 
-    /// Minimises the cost from `initial_guess`, reusing the Jacobian columns `known` of a neighbouring hypothesis for the first values, and the Jacobian
-    /// of earlier points, as long as the cost falls as they predict. The Jacobian of an earlier point ends the search only after a step whose decrease
-    /// of the cost it predicted to a part of what ends the search, and the columns `known` end no full fit.
+    /// Minimises the cost from `initial_guess`, reusing the Jacobian columns `known` of a neighbouring hypothesis for the first values as long as the
+    /// cost falls as these columns predict. The Jacobian of an earlier point is reused too, by a full fit as long as the cost falls as it predicts,
+    /// but for its end.
     pub fn solve_reusing(
         &self,
         initial_guess: &Hypothesis<P>,
         effort: Effort,
         known: Option<&Sensitivities<N>>,
     ) -> Fit<P> {
-        let (at, jacobian) = self.minimised(initial_guess, effort, known);
-        self.fit_at(at, &jacobian)
-    }
-
-    /// The fit of [`Self::solve_reusing`], and its last Jacobian, for fits that begin where this one ended.
-    pub(crate) fn solve_keeping(
-        &self,
-        initial_guess: &Hypothesis<P>,
-        effort: Effort,
-        known: Option<&Sensitivities<N>>,
-    ) -> (Fit<P>, Sensitivities<N>) {
-        let (at, jacobian) = self.minimised(initial_guess, effort, known);
-        let inputs = at.inputs.clone();
-        let fit = self.fit_at(at, &jacobian);
-        (fit, jacobian.kept(self, inputs))
-    }
-
-    /// Point of lowest cost, and the last Jacobian.
-    fn minimised<'a>(
-        &self,
-        initial_guess: &Hypothesis<P>,
-        effort: Effort,
-        known: Option<&'a Sensitivities<N>>,
-    ) -> (Linearisation<N, P>, Jacobian<'a>) {
         let (lower, upper) = self.bounds(initial_guess);
         let inputs = known.and_then(|known| known.inputs.as_ref());
         let mut at = Linearisation::new(self, initial_guess.clone(), inputs);
         let mut damping = 1e-4;
         let mut jacobian = Jacobian::reusing(self, &at, known, effort);
-        // Whether the last step was predicted well enough for a reused Jacobian to end the search.
-        let mut is_exact = false;
         'search: for _ in 0..effort.iterations {
             let (normal, gradient) =
                 self.normal_equations(&jacobian.gram, at.hypothesis.values().len(), &at.hypothesis);
@@ -267,7 +242,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> FitProblem<'_, A, N, P> 
                 let change = DVector::from_fn(now.len(), |i, _| values[i] - now[i]);
                 let foreseen = change.dot(&(2.0 * &gradient - &normal * &change));
                 if jacobian.is_reused && foreseen < MIN_PREDICTED_DECREASE * effort.enough * at.cost() {
-                    if is_exact {
+                    if effort.ends_on_reused {
                         break 'search;
                     }
                     break;
@@ -285,36 +260,31 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> FitProblem<'_, A, N, P> 
                 damping = (damping * 10.0).min(1e6);
             }
             let enough = effort.enough * at.cost();
-            let Some((fall, foreseen)) = fall else {
-                if jacobian.is_current() {
-                    break;
+            match fall {
+                None if !jacobian.is_current() => jacobian = Jacobian::new(self, &at, effort),
+                Some((fall, foreseen)) if fall > enough => {
+                    let missed = (fall - foreseen).abs();
+                    let serves = missed < SERVES * foreseen;
+                    let is_kept = if effort.ends_on_reused {
+                        missed < MAX_DECREASE_ERROR * enough
+                    } else {
+                        serves && jacobian.reused_columns() == 0
+                    };
+                    if is_kept {
+                        jacobian.reuse_at(self, &at);
+                    } else if serves && jacobian.reused_columns() > 0 {
+                        jacobian = Jacobian::reusing(self, &at, known, effort);
+                    } else {
+                        jacobian = Jacobian::new(self, &at, effort);
+                    }
                 }
-                jacobian = Jacobian::new(self, &at, effort);
-                continue;
-            };
-            let missed = (fall - foreseen).abs();
-            is_exact = missed < MAX_DECREASE_ERROR * enough;
-            let may_end =
-                jacobian.is_current() || effort.is_rough || (is_exact && jacobian.reused_columns() == 0);
-            if fall <= enough && may_end {
-                break;
-            }
-            let serves = missed < SERVES * foreseen && fall > enough;
-            let is_kept = if effort.is_rough { is_exact } else { serves && jacobian.reused_columns() == 0 };
-            if is_kept && fall > enough {
-                jacobian.reuse_at(self, &at);
-            } else if serves && jacobian.reused_columns() > 0 {
-                jacobian = Jacobian::reusing(self, &at, known, effort);
-            } else {
-                jacobian = Jacobian::new(self, &at, effort);
+                Some(_) if jacobian.is_reused && !effort.ends_on_reused => {
+                    jacobian = Jacobian::new(self, &at, effort);
+                }
+                _ => break,
             }
         }
         self.progress.unit();
-        (at, jacobian)
-    }
-
-    /// The fit that has ended at a point with a Jacobian.
-    fn fit_at(&self, at: Linearisation<N, P>, jacobian: &Jacobian) -> Fit<P> {
         let covariance = self.covariance(&jacobian.gram, &at);
         let Linearisation { hypothesis, data_cost, prior_cost, costs, .. } = at;
         Fit {

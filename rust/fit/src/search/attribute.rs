@@ -220,7 +220,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let first = self.taken_on(&weights, &fit.hypothesis, first);
         let field = self.field(&weights, &fit, &first);
         self.progress.begin(Phase::Finalists, 2 * FINALISTS + MAX_REWEIGHTINGS);
-        let final_round = self.final_round(&fit, first, &weights);
+        let final_round = self.final_round(&fit.hypothesis, first, &weights);
         let traces = screening.as_ref().and_then(|screening| screening.traces.clone());
         let tests = screening.filter(|s| s.own_traces).map_or_else(Vec::new, |screening| screening.tests);
         let screened = if final_round.weights.is_none() { tests } else { Vec::new() };
@@ -298,11 +298,6 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let near = initial_guess.effects.get(known).is_some_and(|e| e.law.spec().trial != Trial::Whole);
         let jacobian = jacobian.filter(|_| near);
         let fit = self.problem(&weights.training).solve_reusing(initial_guess, effort, jacobian);
-        self.fitted_candidate(weights, fit, known)
-    }
-
-    /// Candidate of a fit to the training windows, judged on the holdout; the effect under test follows the first `known` effects of the model.
-    fn fitted_candidate(&self, weights: &SplitWeighting<N>, fit: Fit<P>, known: usize) -> Candidate<P> {
         let training = fit.costs.iter().map(|cost| weights.training.student_t_cost(*cost)).collect();
         let (holdout, error) = self.judged_on_holdout(weights, &fit);
         let effect = fit.hypothesis.effects.get(known).copied();
@@ -310,15 +305,13 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         Candidate { effect, size, fit, training, holdout, error }
     }
 
-    /// Re-weights the windows by the best candidate's residual and fits the finalists and the current model, whose fit under the weights `given` is
-    /// `settled`, again.
+    /// Re-weights the windows by the best candidate's residual and fits the finalists and the current model again.
     fn final_round(
         &self,
-        settled: &Fit<P>,
+        current: &Hypothesis<P>,
         mut candidates: Vec<Candidate<P>>,
         given: &SplitWeighting<N>,
     ) -> FinalRound<N, P> {
-        let current = &settled.hypothesis;
         let mut hopeless = f64::INFINITY;
         let mut heavier: Option<SplitWeighting<N>> = None;
         for round in 1..=MAX_REWEIGHTINGS {
@@ -339,10 +332,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
                     .extend(candidates.first().into_iter().flat_map(|c| self.other_sides(c, weights)));
             }
             let effort = if last { Effort::FULL } else { Effort::ROUGH };
-            let base = || match heavier {
-                Some(_) => self.candidate(weights, current, current.effects.len(), effort, None),
-                None => self.fitted_candidate(weights, settled.clone(), current.effects.len()),
-            };
+            let base = || self.candidate(weights, current, current.effects.len(), effort, None);
             let (fitted, base) =
                 rayon::join(|| self.fit_candidates(weights, current, initial_guesses, effort, None), base);
             candidates = fitted;
@@ -352,8 +342,9 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             let base = base.score();
             hopeless = candidates.first().map_or(base, |best| 0.5 * (base + best.score()));
         }
-        let base = self.fitted_candidate(given, settled.clone(), current.effects.len());
-        FinalRound { base, candidates, weights: None }
+        let weights = heavier.as_ref().unwrap_or(given);
+        let base = self.candidate(weights, current, current.effects.len(), Effort::FULL, None);
+        FinalRound { base, candidates, weights: heavier }
     }
 
     /// Alternatives to a candidate whose effect is a transmission (joint elasticity, backlash): the same model with encoder and friction on other

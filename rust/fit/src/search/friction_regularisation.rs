@@ -162,7 +162,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     /// further cause is compared with this fit.
     pub(crate) fn fit_with_any_rounding(&self, model: &Hypothesis<P>, weights: &SplitWeighting<N>) -> Fit<P> {
         let problem = self.problem(&weights.training);
-        let (fit, jacobian) = problem.solve_keeping(model, Effort::FULL, None);
+        let fit = problem.solve(model, Effort::FULL);
+        let jacobian = problem.jacobian(&fit.hypothesis);
         let Some(regularised) = self.with_best_widths(&problem, &fit.hypothesis, &jacobian) else {
             return fit;
         };

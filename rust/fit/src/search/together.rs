@@ -4,8 +4,8 @@
 //! the other one dominates the windows' costs. So before a search ends with an open gap, each of the best candidates is accepted on trial: if a
 //! second effect then closes nearly all of the gap, and neither of the two can be spared, both are causes.
 
-use crate::likelihood::context::{DiagnosisContext, SplitWeighting};
-use crate::likelihood::solve::{Effort, Fit};
+use crate::likelihood::context::DiagnosisContext;
+use crate::likelihood::solve::Effort;
 use crate::model::hypothesis::EffectInstance;
 use crate::search::acceptance::{CERTAIN, Ground, best, brings_back, choose, is_possible, moves};
 use crate::search::attribute::{Candidate, SearchNode};
@@ -73,25 +73,18 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         min_relevance: f64,
         seed: u64,
     ) -> Option<Both<N, P>> {
+        let (fit, weights) = self.settle(&first.fit.hypothesis, alone.weights.training.scale);
         // Share of the gap left by `first` that a second effect must remove for the two to remove `NEARLY_ALL` of the whole gap.
         let needed = 1.0 - (1.0 - NEARLY_ALL) / (1.0 - alone.share(first)).max(1e-9);
         let known = alone.traces.as_deref();
-        let promises = |fit: &Fit<P>, weights: &SplitWeighting<N>| {
-            let tests = match known {
-                Some(known) => self.screened_roughly(fit, weights, known),
-                None => self.screened(fit, weights, None).tests,
-            };
-            self.largest_gain(fit, weights, &tests) >= PROMISED_DECREASE * needed
+        let tests = match known {
+            Some(known) => self.screened_roughly(&fit, &weights, known),
+            None => self.screened(&fit, &weights, None).tests,
         };
-        // First under the weights of the node, as fits to weights of their own take longer than the score tests.
-        if !promises(&first.fit, &alone.weights) {
+        if self.largest_gain(&fit, &weights, &tests) < PROMISED_DECREASE * needed {
             return None;
         }
-        let settled = self.settle(&first.fit.hypothesis, alone.weights.training.scale);
-        if !promises(&settled.0, &settled.1) {
-            return None;
-        }
-        let node = self.node_around(settled, min_relevance, known);
+        let node = self.node_around((fit, weights), min_relevance, known);
         let (choice, ground) = choose(&node, true, min_relevance)?;
         let pair = &node.candidates[choice];
         let none = &alone.settled.hypothesis;

@@ -27,7 +27,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     /// The node with its candidates fitted again under window weights made around the candidate of index `one`.
     fn around(&self, current: &Hypothesis<P>, node: &SearchNode<N, P>, one: usize) -> SearchNode<N, P> {
         let chosen = &node.candidates[one].fit.hypothesis;
-        let weights = self.settled_weights(chosen, node.weights.training.scale);
+        let (_, weights) = self.settle(chosen, node.weights.training.scale);
         let initial_guesses = node.candidates.iter().map(|c| c.fit.hypothesis.clone()).collect();
         let (candidates, base) = rayon::join(
             || self.fit_candidates(&weights, current, initial_guesses, Effort::FULL, None),
