@@ -229,14 +229,28 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
             && !self.passes_load
     }
 
-    /// Whether the plant has elastic joints or regularised friction, and no other latent states or torques that jump at a position.
+    /// Whether the plant has latent states or regularised friction, and friction does not depend on accelerations; torques may jump at a position.
     #[inline]
-    pub fn is_elastic_or_regularised(&self) -> bool {
-        !self.is_plain()
-            && !self.drivetrain.has_backlash()
-            && !self.has_hysteresis
-            && !self.jumps
-            && !self.passes_load
+    pub fn is_latent_or_regularised(&self) -> bool {
+        !self.is_plain() && !self.passes_load
+    }
+
+    /// Whether another plant differs in values alone: it has the same transmissions, sides, effects and joints with regularised friction.
+    pub fn is_alike(&self, other: &Self) -> bool {
+        let (one, two) = (&self.drivetrain, &other.drivetrain);
+        let joint = |j: usize| {
+            let backlash =
+                |of: &Drivetrain<T, N>| of.get(j).map(|transmission| transmission.backlash > T::zero());
+            backlash(one) == backlash(two)
+                && one.sides(j) == two.sides(j)
+                && self.is_rounded(j) == other.is_rounded(j)
+        };
+        let same = |(a, b): (&Active<T>, &Active<T>)| {
+            a.joint == b.joint && core::ptr::eq(a.law.spec(), b.law.spec())
+        };
+        self.n_effects == other.n_effects
+            && self.effects().zip(other.effects()).all(same)
+            && (0..N).all(joint)
     }
 
     /// Hooks of the effects on joint `j`: whether they add a torque, and whether they change its Coulomb level.

@@ -9,9 +9,10 @@
 mod batch;
 mod clock;
 mod cursor;
-mod elastic_batch;
-mod elastic_lanes;
 mod lane_step;
+mod latent_batch;
+mod latent_lanes;
+mod latent_motion;
 mod plant_lanes;
 
 use crate::arm::Arm;
@@ -21,7 +22,7 @@ use crate::integrate::State;
 use crate::plant::Plant;
 use crate::real::Real;
 use batch::LaneBatch;
-pub use elastic_batch::ElasticRollout;
+pub use latent_batch::{Correction, LatentRollout};
 
 /// Number of runs that a batch rollout simulates at a time.
 pub const WIDTH: usize = 8;

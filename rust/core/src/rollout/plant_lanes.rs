@@ -95,13 +95,14 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, const
     }
 
     /// Coulomb level of joint `j` in the lanes where it slides, in `direction`, and torque of the effects on joint `j`, N m (N); `other` is the
-    /// direction in which the joint after `j` slides.
+    /// direction in which the joint after `j` slides, `memory` the hysteresis state of joint `j`, if it has one.
     #[inline(never)]
     pub(super) fn laws(
         &self,
         at: &JointInstant<Lanes<T, C, W>>,
         direction: Lanes<T, C, W>,
         other: Lanes<T, C, W>,
+        memory: Option<&Lanes<T, C, W>>,
         j: usize,
     ) -> [Lanes<T, C, W>; 2] {
         let mut x = [self.point(at, j, 0); W];
@@ -115,6 +116,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, const
         if self.hooks[j].force {
             for l in 0..W {
                 x[l].other = other.0[l];
+                x[l].memory = memory.map_or(T::zero(), |memory| memory.0[l]);
             }
             force = self.forces(&x, j);
         }
@@ -244,7 +246,7 @@ impl<
             let (mut level, viscous) = (self.0.rigid.coulomb[j], self.0.rigid.viscous[j]);
             if EFFECTS && (self.0.hooks[j].force || self.0.hooks[j].coulomb) {
                 let [own, force] =
-                    self.0.laws(&JointInstant::of(at, j), direction[j], direction[(j + 1) % N], j);
+                    self.0.laws(&JointInstant::of(at, j), direction[j], direction[(j + 1) % N], None, j);
                 (level, generalized_force[j]) = (own, generalized_force[j] + force);
             }
             // Terms are subtracted in the order in which they are computed, the bias last.

@@ -13,7 +13,6 @@ use crate::model::hypothesis::{EffectInstance, Hypothesis};
 use crate::progress::Phase;
 use armgap_core::arm::Arm;
 use armgap_core::effect::Trial;
-use rayon::prelude::*;
 use std::sync::Arc;
 
 /// Largest number of candidates that get a full fit at each node of the model search.
@@ -118,15 +117,11 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let earlier = |c: &EffectInstance| {
             known.filter(|_| c.law.spec().trial == Trial::Whole).and_then(|known| known.whitened(c, scale))
         };
-        let trace = |c: &EffectInstance| match earlier(c) {
-            Some(trace) => (trace, true),
-            None => (point.trace(c), false),
-        };
-        let (mut traces, is_earlier): (Vec<Vec<f64>>, Vec<bool>) = candidates.par_iter().map(trace).unzip();
+        let (mut traces, is_earlier) = point.traces_beside(&candidates, earlier);
         let mut tests = point.tests(&candidates, &traces);
         let again = best_of_places(&tests, &is_earlier);
         let best: Vec<EffectInstance> = again.iter().map(|i| candidates[*i]).collect();
-        let renewed: Vec<Vec<f64>> = best.par_iter().map(|c| point.trace(c)).collect();
+        let renewed = point.traces(&best);
         let tested = point.tests(&best, &renewed);
         // Initial guesses that are not simulated again lose to those that are.
         for (test, _) in tests.iter_mut().zip(&is_earlier).filter(|(_, earlier)| **earlier) {
@@ -152,8 +147,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let jacobian = problem.jacobian(&fit.hypothesis);
         let point = TestPoint::new(&problem, &fit.hypothesis, &jacobian);
         let earlier = |c: &EffectInstance| known.whitened(c, &weights.training.scale);
-        let trace = |c: &EffectInstance| earlier(c).unwrap_or_else(|| point.trace(c));
-        let traces: Vec<Vec<f64>> = candidates.par_iter().map(trace).collect();
+        let (traces, _) = point.traces_beside(&candidates, earlier);
         point.tests(&candidates, &traces)
     }
 

@@ -119,8 +119,7 @@ pub fn screen<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     candidates: &[EffectInstance],
 ) -> Vec<ScoreTest> {
     let point = TestPoint::new(problem, base, jacobian);
-    let traces: Vec<Vec<f64>> = candidates.par_iter().map(|candidate| point.trace(candidate)).collect();
-    point.tests(candidates, &traces)
+    point.tests(candidates, &point.traces(candidates))
 }
 
 /// A fitted hypothesis around which candidates are tested, with its residual and Jacobian.
@@ -143,24 +142,59 @@ impl<'a, A: Arm<f64, N, P>, const N: usize, const P: usize> TestPoint<'a, A, N, 
         Self { problem, base, jacobian, residual }
     }
 
-    /// Trace of a candidate: derivative of the whitened prediction by the candidate's tested parameter at its neutral value; for an effect with a
+    /// Traces of candidates: derivative of the whitened prediction by each candidate's tested parameter at its neutral value; for an effect with a
     /// threshold the whole change of the prediction by the effect instead.
-    pub(crate) fn trace(&self, candidate: &EffectInstance) -> Vec<f64> {
-        let i = tested(candidate);
-        let (moved, step) = match candidate.law.spec().trial {
-            Trial::Amplitudes(_) => {
-                let mut moved = neutral(candidate);
-                let step = TRIAL * (candidate.p[i] - moved.p[i]);
-                moved.p[i] += step;
-                (moved, step)
-            }
-            Trial::Ray => (EffectInstance { p: candidate.p.map(|x| TRIAL * x), ..*candidate }, TRIAL),
-            Trial::Whole | Trial::Disturbance => (*candidate, 1.0),
-        };
-        let inputs = self.jacobian.inputs.as_ref();
-        let (there, _) = self.problem.residual_beside(&self.base.with(moved), inputs);
-        self.problem.progress.unit();
-        self.residual.iter().zip(&there).map(|(here, there)| (here - there) / step).collect()
+    pub(crate) fn traces(&self, candidates: &[EffectInstance]) -> Vec<Vec<f64>> {
+        let mut order: Vec<usize> = (0..candidates.len()).collect();
+        order.sort_by_key(|i| candidates[*i].place());
+        let alike: Vec<&[usize]> =
+            order.chunk_by(|a, b| candidates[*a].place() == candidates[*b].place()).collect();
+        let traced = alike.par_iter().flat_map(|alike| {
+            let own: Vec<EffectInstance> = alike.iter().map(|i| candidates[*i]).collect();
+            let traces = self.traces_at_one_place(&own);
+            alike.par_iter().copied().zip(traces).collect::<Vec<_>>()
+        });
+        let mut traces = vec![Vec::new(); candidates.len()];
+        for (i, trace) in traced.collect::<Vec<_>>() {
+            traces[i] = trace;
+        }
+        traces
+    }
+
+    /// Traces of candidates, those that are known from `earlier` taken over, and whether each was.
+    pub(crate) fn traces_beside(
+        &self,
+        candidates: &[EffectInstance],
+        earlier: impl Fn(&EffectInstance) -> Option<Vec<f64>>,
+    ) -> (Vec<Vec<f64>>, Vec<bool>) {
+        let known: Vec<Option<Vec<f64>>> = candidates.iter().map(earlier).collect();
+        let is_earlier: Vec<bool> = known.iter().map(Option::is_some).collect();
+        let open: Vec<EffectInstance> =
+            candidates.iter().zip(&is_earlier).filter(|(_, earlier)| !**earlier).map(|(c, _)| *c).collect();
+        let mut computed = self.traces(&open).into_iter();
+        let traces = known.into_iter().map(|trace| trace.or_else(|| computed.next()).unwrap_or_default());
+        (traces.collect(), is_earlier)
+    }
+
+    /// Traces of candidates that are one effect on one joint, with different values.
+    fn traces_at_one_place(&self, candidates: &[EffectInstance]) -> Vec<Vec<f64>> {
+        let (moved, steps): (Vec<Hypothesis<P>>, Vec<f64>) = candidates
+            .iter()
+            .map(|candidate| {
+                let (moved, step) = displaced(candidate);
+                (self.base.with(moved), step)
+            })
+            .unzip();
+        let known = vec![self.jacobian.inputs.as_ref(); moved.len()];
+        let residuals = self.problem.residuals_beside(&moved, &known);
+        residuals
+            .into_iter()
+            .zip(steps)
+            .map(|(there, step)| {
+                self.problem.progress.unit();
+                self.residual.iter().zip(&there).map(|(here, there)| (here - there) / step).collect()
+            })
+            .collect()
     }
 
     /// Score tests of candidates with the given traces.
@@ -199,6 +233,20 @@ impl<'a, A: Arm<f64, N, P>, const N: usize, const P: usize> TestPoint<'a, A, N, 
         let weighting = self.problem.weighting;
         let costs = weighting.costs(self.problem.data, residual);
         costs.into_iter().map(|cost| weighting.student_t_cost(cost)).sum()
+    }
+}
+
+/// A candidate with its tested parameter displaced from its neutral value, and the displacement; for an effect with a threshold the whole effect.
+fn displaced(candidate: &EffectInstance) -> (EffectInstance, f64) {
+    match candidate.law.spec().trial {
+        Trial::Amplitudes(_) => {
+            let (i, mut moved) = (tested(candidate), neutral(candidate));
+            let step = TRIAL * (candidate.p[i] - moved.p[i]);
+            moved.p[i] += step;
+            (moved, step)
+        }
+        Trial::Ray => (EffectInstance { p: candidate.p.map(|x| TRIAL * x), ..*candidate }, TRIAL),
+        Trial::Whole | Trial::Disturbance => (*candidate, 1.0),
     }
 }
 

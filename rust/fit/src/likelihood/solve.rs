@@ -12,6 +12,7 @@ use crate::predict::log_inputs::LogInputs;
 use crate::predict::window::Dataset;
 use crate::progress::ProgressReporter;
 use armgap_core::arm::Arm;
+use armgap_core::rollout::WIDTH;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -155,16 +156,35 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> FitProblem<'_, A, N, P> 
         let values = hypothesis.values();
         let steps = self.steps(hypothesis);
         let of_arm = inputs.filter(|_| held).map(LogInputs::with_latent_states_held);
-        which
-            .par_iter()
-            .map(|&i| {
-                let mut moved = values.clone();
-                moved[i] += steps[i];
-                let known = if i < P { of_arm.as_ref().or(inputs) } else { inputs };
-                let (there, _) = self.residual_beside(&hypothesis.with_values(&moved), known);
-                residual.iter().zip(&there).map(|(here, there)| (here - there) / steps[i]).collect()
-            })
-            .collect()
+        let moved = |i: usize| {
+            let mut moved = values.clone();
+            moved[i] += steps[i];
+            hypothesis.with_values(&moved)
+        };
+        let moved: Vec<_> = which.iter().map(|&i| moved(i)).collect();
+        let known: Vec<_> =
+            which.iter().map(|&i| if i < P { of_arm.as_ref().or(inputs) } else { inputs }).collect();
+        let column = |(&i, there): (&usize, Vec<f64>)| {
+            residual.iter().zip(&there).map(|(here, there)| (here - there) / steps[i]).collect()
+        };
+        which.par_iter().zip(self.residuals_beside(&moved, &known)).map(column).collect()
+    }
+
+    /// Whitened residuals of hypotheses that differ in values alone; `known` are the inputs of the logs under another hypothesis for each, shared where
+    /// they are the same. Latent states of several hypotheses are simulated at a time.
+    pub(crate) fn residuals_beside(
+        &self,
+        hypotheses: &[Hypothesis<P>],
+        known: &[Option<&LogInputs<N>>],
+    ) -> Vec<Vec<f64>> {
+        let some = |(hypotheses, known): (&[Hypothesis<P>], &[Option<&LogInputs<N>>])| {
+            let inputs = self.data.inputs_beside(self.arm, hypotheses, known);
+            let residual = |(hypothesis, inputs): (&Hypothesis<P>, &Option<LogInputs<N>>)| {
+                self.residual_beside(hypothesis, inputs.as_ref()).0
+            };
+            hypotheses.par_iter().zip(&inputs).map(residual).collect::<Vec<_>>()
+        };
+        hypotheses.par_chunks(WIDTH).zip(known.par_chunks(WIDTH)).flat_map(some).collect()
     }
 
     /// Jacobian of the prediction by all free values.

@@ -58,6 +58,12 @@ impl EffectInstance {
         }
     }
 
+    /// Name of the effect, joint, and sides of encoder and friction and whether the rotor rides: equal for effects that differ in values alone.
+    pub fn place(&self) -> (&'static str, usize, [bool; 3]) {
+        let Sides { encoder_at_motor, friction_at_motor, rotor_rides } = self.sides;
+        (self.law.spec().name, self.joint, [encoder_at_motor, friction_at_motor, rotor_rides])
+    }
+
     /// Whether `other` is the same effect on the same joint, at any parameter values.
     pub fn same_place(&self, other: &Self) -> bool {
         self.law.spec().name == other.law.spec().name && self.joint == other.joint

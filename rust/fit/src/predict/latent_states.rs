@@ -4,12 +4,14 @@
 //! position of its link; so neither needs an initial guess at a window's start.
 
 use crate::log::track::{MeasuredState, Track};
-use crate::predict::window::MAX_SUBSTEPS_FRICTION;
+use crate::predict::rollouts::{MAX_SUBSTEPS_FRICTION, Rollouts};
 use armgap_core::arm::Arm;
 use armgap_core::effect::{InputSegment, interval};
-use armgap_core::integrate::{Interval, State, StepLimits, advance_in_stable_steps};
+use armgap_core::integrate::{State, StepLimits};
 use armgap_core::plant::{Mode, Plant};
+use armgap_core::rollout::{Correction, Run};
 use armgap_core::transmission::{LatentState, Sides, Transmission};
+use rayon::prelude::*;
 
 /// Largest phase of a motor's natural oscillation within one step of the simulation of latent states, rad.
 const MAX_PHASE_PER_STEP: f64 = 1.0;
@@ -25,17 +27,36 @@ const MAX_STEPS: usize = 8;
 /// Largest latent position or rate [SI]; larger values are set to it: the hypothesis is wrong then, and its cost will be large.
 const LIMIT: f64 = 1e3;
 
-/// Latent states of a plant at every sample of a track up to sample `last`, under the commanded torques `torque`.
-pub fn latent_states<A: Arm<f64, N, P>, const N: usize, const P: usize>(
-    track: &Track<N>,
-    plant: &Plant<f64, A, N, P>,
-    torque: &[[InputSegment<f64>; N]],
-    last: usize,
+/// A log and the plant whose latent states along it are wanted.
+pub struct LatentRun<'a, A, const N: usize, const P: usize> {
+    /// Log with the measured motion.
+    pub track: &'a Track<N>,
+    /// Plant with latent states.
+    pub plant: &'a Plant<f64, A, N, P>,
+    /// Torques of the motors from each sample to the next.
+    pub torque: &'a [[InputSegment<f64>; N]],
+    /// Index of the last sample at which the states are wanted.
+    pub last: usize,
+}
+
+/// Latent states of plants that differ in values alone, at every sample of each run's log up to its last one; whole arms are simulated by the method
+/// `R`.
+pub fn latent_states<R: Rollouts, A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    runs: &[LatentRun<'_, A, N, P>],
+) -> Vec<Vec<LatentState<f64, N>>> {
+    let at_motor = |run: &LatentRun<A, N, P>| (0..N).any(|j| run.plant.drivetrain().sides(j) != Sides::LINK);
+    if runs.iter().any(at_motor) {
+        beside_measured_motors::<R, A, N, P>(runs)
+    } else {
+        runs.par_iter().map(beside_measured_links).collect()
+    }
+}
+
+/// Latent states of an arm with encoders and friction on the links: each motor is simulated beside the measured motion of its link.
+fn beside_measured_links<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    &LatentRun { track, plant, torque, last }: &LatentRun<'_, A, N, P>,
 ) -> Vec<LatentState<f64, N>> {
     let path = track.path();
-    if (0..N).any(|j| plant.drivetrain().sides(j) != Sides::LINK) {
-        return beside_measured(track, plant, torque, last);
-    }
     let mut now = LatentState::none(path[0].q);
     let rates: [f64; N] = std::array::from_fn(|j| {
         plant.drivetrain().get(j).map_or(0.0, |transmission| transmission.rate(f64::MAX))
@@ -64,29 +85,71 @@ pub fn latent_states<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     all
 }
 
-/// Latent states of an arm with encoders on motors or friction on motors: the whole arm is simulated from sample to sample, and measured
-/// positions and velocities are inserted at each sample.
-fn beside_measured<A: Arm<f64, N, P>, const N: usize, const P: usize>(
-    track: &Track<N>,
-    plant: &Plant<f64, A, N, P>,
-    torque: &[[InputSegment<f64>; N]],
-    last: usize,
-) -> Vec<LatentState<f64, N>> {
-    let path = track.path();
-    let drivetrain = plant.drivetrain();
-    let rates = plant.step_rates(&path[0].q);
-    let limits = StepLimits { near_standstill: MAX_SUBSTEPS_FRICTION, elsewhere: MAX_STEPS };
-    let mut now = State::new(path[0].q, path[0].dq);
-    let mut all = Vec::with_capacity(last + 1);
-    for k in 0..=last {
-        let before = now.latent.deflection;
-        if k > 0 {
-            let h = track.t[k] - track.t[k - 1];
-            let interval = Interval { t: track.t[k - 1], h, torque: &torque[k - 1] };
-            advance_in_stable_steps(plant, &mut now, &interval, &rates, limits);
-        }
+/// Latent states of arms with encoders on motors or friction on motors: the whole arm is simulated from sample to sample, and measured positions and
+/// velocities are inserted at each sample.
+fn beside_measured_motors<R: Rollouts, A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    runs: &[LatentRun<'_, A, N, P>],
+) -> Vec<Vec<LatentState<f64, N>>> {
+    let mut insertions: Vec<_> = runs.iter().map(Insertion::new).collect();
+    let mut shown: Vec<_> = runs.iter().map(|run| vec![0.0; run.last * N]).collect();
+    let mut rollouts: Vec<_> = runs
+        .iter()
+        .zip(&mut shown)
+        .zip(&mut insertions)
+        .map(|((run, positions), insertion)| Run {
+            plant: run.plant,
+            t: &run.track.t[..=run.last],
+            torque: &run.torque[..run.last],
+            state: insertion.start(),
+            positions,
+        })
+        .collect();
+    let step_limits = StepLimits { near_standstill: MAX_SUBSTEPS_FRICTION, elsewhere: MAX_STEPS };
+    R::corrected(&mut rollouts, &mut insertions, step_limits);
+    insertions.into_iter().map(|insertion| insertion.states).collect()
+}
+
+/// Insertion of the measured positions and velocities of a log into a simulated arm, sample by sample.
+struct Insertion<'a, A, const N: usize, const P: usize> {
+    run: &'a LatentRun<'a, A, N, P>,
+    /// Latent states at the samples so far.
+    states: Vec<LatentState<f64, N>>,
+}
+
+impl<'a, A: Arm<f64, N, P>, const N: usize, const P: usize> Insertion<'a, A, N, P> {
+    fn new(run: &'a LatentRun<'a, A, N, P>) -> Self {
+        Self { run, states: Vec::with_capacity(run.last + 1) }
+    }
+
+    /// State of the arm at the first sample, with the measured motion inserted.
+    fn start(&mut self) -> State<f64, N> {
+        let first = self.run.track.path()[0];
+        let mut state = State::new(first.q, first.dq);
+        self.correct(0, &mut state);
+        state
+    }
+
+    /// Part of the correction of the simulated deflection of joint `j`, whose encoder is on its motor, to that by the motor's torque balance that is
+    /// made at a sample after the first, rad or m; zero where the motor may stick.
+    fn from_balance(&self, j: usize, latent: &LatentState<f64, N>) -> f64 {
+        let LatentRun { track, plant, torque, .. } = self.run;
+        let (path, k) = (track.path(), self.states.len());
+        let sample = Motor { path: [&path[k - 1], &path[k]], h: track.t[k] - track.t[k - 1], j };
+        let before = self.states[k - 1].deflection[j];
+        let predicted = 0.5 * (before + latent.deflection[j]);
+        sample
+            .deflection(plant, &torque[k - 1][j], latent.deflection_rate[j])
+            .map_or(0.0, |balance| (sample.h / MEMORY).min(0.5) * (balance - predicted))
+    }
+}
+
+impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Correction<f64, N> for Insertion<'_, A, N, P> {
+    /// Inserts the measured motion at the next sample into the state simulated from the sample before.
+    fn correct(&mut self, _: usize, now: &mut State<f64, N>) {
+        let (plant, k) = (self.run.plant, self.states.len());
+        let (path, drivetrain) = (self.run.track.path(), plant.drivetrain());
         if !now.is_finite() || now.latent.deflection.amax() > LIMIT {
-            now = State::new(path[k].q, path[k].dq);
+            *now = State::new(path[k].q, path[k].dq);
         }
         for j in 0..N {
             let (at, rate) = (path[k].q[j], path[k].dq[j]);
@@ -97,15 +160,8 @@ fn beside_measured<A: Arm<f64, N, P>, const N: usize, const P: usize>(
             if drivetrain.sides(j).encoder_at_motor {
                 (now.latent.deflection[j], now.latent.deflection_rate[j]) = (at - now.q[j], rate - now.dq[j]);
                 if k > 0 && transmission.backlash <= 0.0 {
-                    let sample = Motor { path: [&path[k - 1], &path[k]], h: track.t[k] - track.t[k - 1], j };
-                    let predicted = 0.5 * (before[j] + now.latent.deflection[j]);
-                    if let Some(balance) =
-                        sample.deflection(plant, &torque[k - 1][j], now.latent.deflection_rate[j])
-                    {
-                        let share = (sample.h / MEMORY).min(0.5);
-                        now.latent.deflection[j] += share * (balance - predicted);
-                        now.q[j] = at - now.latent.deflection[j];
-                    }
+                    now.latent.deflection[j] += self.from_balance(j, &now.latent);
+                    now.q[j] = at - now.latent.deflection[j];
                 }
             } else {
                 now.latent.deflection[j] += now.q[j] - at;
@@ -130,9 +186,8 @@ fn beside_measured<A: Arm<f64, N, P>, const N: usize, const P: usize>(
             std::array::from_fn(|j| Mode::of(drivetrain.friction_velocity(j, now.dq[j], &now.latent)));
         now.latent.memory = plant.memory(&now.q, &now.latent);
         now.latent.anchor = now.q;
-        all.push(now.latent);
+        self.states.push(now.latent);
     }
-    all
 }
 
 /// Measured motion of the motor of joint `j` over one sample interval of `h` seconds: the states at its ends, by the encoder on the motor.

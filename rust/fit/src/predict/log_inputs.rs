@@ -5,7 +5,8 @@
 
 use crate::log::track::Track;
 use crate::model::hypothesis::{EffectInstance, Hypothesis};
-use crate::predict::latent_states::latent_states;
+use crate::predict::latent_states::{LatentRun, latent_states};
+use crate::predict::rollouts::Rollouts;
 use crate::predict::window::Dataset;
 use armgap_core::arm::Arm;
 use armgap_core::effect::{Hooks, InputSegment};
@@ -16,6 +17,9 @@ use std::sync::Arc;
 
 /// Torques of one log that reach the joints, sample by sample.
 type Torques<const N: usize> = Vec<[InputSegment<f64>; N]>;
+
+/// Latent states of all logs, sample by sample.
+type LatentStates<const N: usize> = Vec<Option<Vec<LatentState<f64, N>>>>;
 
 /// Torques that reach the joints, and latent states, of all logs of a dataset under one hypothesis, with all on which they depend besides the logs.
 #[derive(Clone)]
@@ -29,7 +33,7 @@ pub struct LogInputs<const N: usize> {
     /// Whether hypotheses with the same torques take over the latent states, whatever else differs.
     is_held: bool,
     torques: Arc<Vec<Option<Torques<N>>>>,
-    latent: Arc<Vec<Option<Vec<LatentState<f64, N>>>>>,
+    latent: Arc<LatentStates<N>>,
 }
 
 /// What the latent states of a log depend on besides the torques that reach the joints and hysteresis.
@@ -61,7 +65,41 @@ impl<const N: usize> LatentSource<N> {
 impl<const N: usize> LogInputs<N> {
     /// Inputs of the logs of `data` under a hypothesis with the simulator `plant`; what does not differ from the inputs `known` of the same dataset
     /// under another hypothesis is shared with them.
-    pub(crate) fn new<A: Arm<f64, N, P>, const P: usize>(
+    pub(crate) fn new<R: Rollouts, A: Arm<f64, N, P>, const P: usize>(
+        data: &Dataset<N>,
+        hypothesis: &Hypothesis<P>,
+        plant: &Plant<f64, A, N, P>,
+        known: Option<&Self>,
+    ) -> Self {
+        let mut inputs = Self::without_latent_states(data, hypothesis, plant, known);
+        if !inputs.shares_latent_states(known) {
+            inputs.latent = Arc::new(latent::<R, A, N, P>(data, &[(plant, &*inputs.torques)]).concat());
+        }
+        inputs
+    }
+
+    /// Inputs of the logs of `data` under hypotheses that differ in values alone, each with its simulator and the inputs known of another hypothesis, as
+    /// [`LogInputs::new`] has them.
+    pub(crate) fn of_all<R: Rollouts, A: Arm<f64, N, P>, const P: usize>(
+        data: &Dataset<N>,
+        hypotheses: &[(&Hypothesis<P>, &Plant<f64, A, N, P>, Option<&Self>)],
+    ) -> Vec<Self> {
+        let mut all: Vec<Self> = hypotheses
+            .par_iter()
+            .map(|(hypothesis, plant, known)| Self::without_latent_states(data, hypothesis, plant, *known))
+            .collect();
+        let own: Vec<usize> =
+            (0..all.len()).filter(|&i| !all[i].shares_latent_states(hypotheses[i].2)).collect();
+        let simulated: Vec<_> = own.iter().map(|&i| (hypotheses[i].1, &*all[i].torques)).collect();
+        let latent = latent::<R, A, N, P>(data, &simulated);
+        for (i, latent) in own.into_iter().zip(latent) {
+            all[i].latent = Arc::new(latent);
+        }
+        all
+    }
+
+    /// Inputs of the logs under a hypothesis, with the latent states of the inputs `known`, if any.
+    fn without_latent_states<A: Arm<f64, N, P>, const P: usize>(
         data: &Dataset<N>,
         hypothesis: &Hypothesis<P>,
         plant: &Plant<f64, A, N, P>,
@@ -71,16 +109,21 @@ impl<const N: usize> LogInputs<N> {
             hypothesis.effects.iter().filter(|e| hook(&e.law.spec().hooks)).copied().collect()
         };
         let (on_commands, with_memory) = (with(|hooks| hooks.command), with(|hooks| hooks.memory));
-        let source = LatentSource::new(hypothesis, plant);
-        let same_torques = known.filter(|known| are_equal(&known.on_commands, &on_commands));
-        let torques = same_torques
+        let torques = known
+            .filter(|known| are_equal(&known.on_commands, &on_commands))
             .map_or_else(|| Arc::new(torques(&data.tracks, hypothesis)), |known| Arc::clone(&known.torques));
-        let same_latent = same_torques.filter(|known| {
-            known.is_held || (are_equal(&known.with_memory, &with_memory) && known.source == source)
-        });
-        let latent = same_latent
-            .map_or_else(|| Arc::new(latent(data, plant, &torques)), |known| Arc::clone(&known.latent));
+        let source = LatentSource::new(hypothesis, plant);
+        let latent = known.map_or_else(Arc::default, |known| Arc::clone(&known.latent));
         Self { on_commands, with_memory, source, is_held: false, torques, latent }
+    }
+
+    /// Whether the latent states are those of the inputs `known` of another hypothesis.
+    fn shares_latent_states(&self, known: Option<&Self>) -> bool {
+        known.is_some_and(|known| {
+            let same_latent = known.is_held
+                || (are_equal(&known.with_memory, &self.with_memory) && known.source == self.source);
+            Arc::ptr_eq(&known.torques, &self.torques) && same_latent
+        })
     }
 
     /// The inputs, whose latent states hypotheses with the same torques take over, whatever else differs.
@@ -114,25 +157,36 @@ fn torques<const N: usize, const P: usize>(
     tracks.iter().map(of).collect()
 }
 
-/// Latent states at every log's samples, up to the start of its last window; `None` for a plant without latent states.
-fn latent<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+/// Latent states at every log's samples, up to the start of its last window, of plants that differ in values alone, each under its torques; `None` for
+/// logs without windows, and for plants without latent states.
+fn latent<R: Rollouts, A: Arm<f64, N, P>, const N: usize, const P: usize>(
     data: &Dataset<N>,
-    plant: &Plant<f64, A, N, P>,
-    torques: &[Option<Torques<N>>],
-) -> Vec<Option<Vec<LatentState<f64, N>>>> {
-    if !plant.has_latent_states() {
-        return vec![None; data.tracks.len()];
+    simulated: &[(&Plant<f64, A, N, P>, &Vec<Option<Torques<N>>>)],
+) -> Vec<LatentStates<N>> {
+    let mut all = vec![vec![None; data.tracks.len()]; simulated.len()];
+    let (mut places, mut runs) = (Vec::new(), Vec::new());
+    for (i, (plant, torques)) in
+        simulated.iter().enumerate().filter(|(_, (plant, _))| plant.has_latent_states())
+    {
+        for (index, track) in data.tracks.iter().enumerate() {
+            let starts = data.windows.iter().filter(|w| w.track == index).map(|w| w.first);
+            if let Some(last) = starts.max() {
+                let torque = torques[index].as_deref().unwrap_or(&track.held);
+                places.push((i, index));
+                runs.push(LatentRun { track, plant, torque, last });
+            }
+        }
     }
-    let of = |(index, track): (usize, &Track<N>)| {
-        let last = data.windows.iter().filter(|w| w.track == index).map(|w| w.first).max()?;
-        Some(latent_states(track, plant, torques[index].as_deref().unwrap_or(&track.held), last))
-    };
-    data.tracks.par_iter().enumerate().map(of).collect()
+    for ((i, index), states) in places.into_iter().zip(latent_states::<R, A, N, P>(&runs)) {
+        all[i][index] = Some(states);
+    }
+    all
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::predict::rollouts::SideBySide;
     use armgap_core::arm::Pendulum;
     use armgap_core::effect::find;
     use armgap_core::integrate::{Interval, State, StepLimits, advance_in_stable_steps};
@@ -165,7 +219,7 @@ mod tests {
     }
 
     fn inputs(data: &Dataset<1>, of: &Hypothesis<4>, known: Option<&LogInputs<1>>) -> LogInputs<1> {
-        LogInputs::new(data, of, &of.plant(&PENDULUM).expect("one effect"), known)
+        LogInputs::new::<SideBySide, _, 4>(data, of, &of.plant(&PENDULUM).expect("one effect"), known)
     }
 
     #[test]

@@ -3,7 +3,8 @@
 use crate::log::track::Track;
 use crate::model::hypothesis::{EffectInstance, Hypothesis};
 use crate::numeric::smooth::{Local, local_cubic};
-use crate::predict::latent_states::latent_states;
+use crate::predict::latent_states::{LatentRun, latent_states};
+use crate::predict::rollouts::Singly;
 use armgap_core::arm::Arm;
 use armgap_core::transmission::LatentState;
 use nalgebra::SVector;
@@ -45,8 +46,8 @@ pub fn inverse_dynamics_residuals<A: Arm<f64, N, P>, const N: usize, const P: us
     let held = model.command(&track.t, &track.held, pushes, &track.tables);
     let held = held.as_deref().unwrap_or(&track.held);
     let plant = model.plant(arm)?;
-    let has_latent = plant.has_latent_states();
-    let latent = has_latent.then(|| latent_states(track, &plant, held, track.len() - 1));
+    let run = LatentRun { track, plant: &plant, torque: held, last: track.len() - 1 };
+    let latent = plant.has_latent_states().then(|| latent_states::<Singly, A, N, P>(&[run]).concat());
     let widths = std::array::from_fn(|j| plant.rounding(j).max(slow));
     let soft = plant.with_rounding(widths);
     let sample = |k: usize| {

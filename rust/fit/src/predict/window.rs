@@ -7,32 +7,13 @@ use crate::log::cut::cut_at_smooth_motion;
 use crate::log::track::{InitialState, Track};
 use crate::model::hypothesis::Hypothesis;
 use crate::predict::log_inputs::LogInputs;
+use crate::predict::rollouts::{DIVERGED, Rollouts, SideBySide, Singly};
 use armgap_core::arm::Arm;
-use armgap_core::cpu::Level;
-use armgap_core::integrate::{Interval, State, StepLimits, advance_in_stable_steps};
+use armgap_core::integrate::State;
 use armgap_core::plant::{Mode, Plant};
-use armgap_core::rollout::{BatchRollout, ElasticRollout, Run, WIDTH};
+use armgap_core::rollout::Run;
 use armgap_core::transmission::LatentState;
 use nalgebra::SVector;
-use rayon::prelude::*;
-
-/// Size of a predicted position [rad or m] beyond which the rollout has diverged; the predictions from there on have this value, so that the cost
-/// stays finite.
-pub(crate) const DIVERGED: f64 = 1e3;
-
-/// Largest number of sub-steps per sample for joints whose regularised friction stops them near standstill. Widths of the regularisation that need
-/// more are not tried.
-pub(crate) const MAX_SUBSTEPS_FRICTION: usize = 16;
-
-/// Largest number of sub-steps per sample for motors that oscillate against their links; a stiffer hypothesis is rejected by its cost.
-const MAX_SUBSTEPS_DRIVEN: usize = 5;
-
-/// Largest number of sub-steps per sample for joints that hit a joint limit.
-const MAX_SUBSTEPS_IMPACT: usize = 12;
-
-/// Largest number of sub-steps per sample for joints whose viscous friction stops them within less than a sample, as that of a geared wrist without
-/// its rotor in the model does.
-const MAX_SUBSTEPS_STIFF: usize = 100;
 
 /// Length of the blocks of windows that count as independent observations, s: torques that no model describes are correlated over some tenths of a second,
 /// and with them the windows of a log.
@@ -195,13 +176,32 @@ impl<const N: usize> Dataset<N> {
         self.predict_by::<SideBySide, A, P>(arm, hypothesis, offsets, known)
     }
 
+    /// Inputs of the logs under hypotheses that differ in values alone, each beside the inputs `known` of another hypothesis; none for hypotheses that
+    /// cannot be simulated.
+    pub(crate) fn inputs_beside<A: Arm<f64, N, P>, const P: usize>(
+        &self,
+        arm: &A,
+        hypotheses: &[Hypothesis<P>],
+        known: &[Option<&LogInputs<N>>],
+    ) -> Vec<Option<LogInputs<N>>> {
+        let plants: Vec<_> = hypotheses.iter().map(|hypothesis| hypothesis.plant(arm)).collect();
+        let simulated: Vec<_> = hypotheses
+            .iter()
+            .zip(&plants)
+            .zip(known)
+            .filter_map(|((hypothesis, plant), known)| Some((hypothesis, plant.as_ref()?, *known)))
+            .collect();
+        let mut inputs = LogInputs::of_all::<SideBySide, A, P>(self, &simulated).into_iter();
+        plants.iter().map(|plant| plant.as_ref().and_then(|_| inputs.next())).collect()
+    }
+
     /// Inputs of the logs under a hypothesis; none if it cannot be simulated.
     pub(crate) fn log_inputs<A: Arm<f64, N, P>, const P: usize>(
         &self,
         arm: &A,
         hypothesis: &Hypothesis<P>,
     ) -> Option<LogInputs<N>> {
-        Some(LogInputs::new(self, hypothesis, &hypothesis.plant(arm)?, None))
+        Some(LogInputs::new::<SideBySide, A, P>(self, hypothesis, &hypothesis.plant(arm)?, None))
     }
 
     /// Predicted positions of all windows, rad or m, one rollout at a time: for arms whose long equation of motion gains nothing from vector lanes.
@@ -225,8 +225,8 @@ impl<const N: usize> Dataset<N> {
         let Some(plant) = hypothesis.plant(arm) else {
             return (predicted, None);
         };
-        let inputs = LogInputs::new(self, hypothesis, &plant, known);
-        let (mut batched, mut elastic, mut scalar) =
+        let inputs = LogInputs::new::<R, A, P>(self, hypothesis, &plant, known);
+        let (mut batched, mut latent, mut scalar) =
             (Vec::with_capacity(self.windows.len()), Vec::new(), Vec::new());
         let mut rest = predicted.as_mut_slice();
         for (window, shift) in self.windows.iter().zip(offsets) {
@@ -240,18 +240,19 @@ impl<const N: usize> Dataset<N> {
                 enter(&plant, &mut state, &states[window.first]);
             }
             let (t, torque) = (&track.t[window.first..=window.last], &torque[window.first..window.last]);
-            let runs =
-                if plant.only_modes_change() || (plant.is_plain() && !self.is_near_edge(window, &plant)) {
-                    &mut batched
-                } else if plant.is_elastic_or_regularised() {
-                    &mut elastic
-                } else {
-                    &mut scalar
-                };
+            let runs = if plant.jumps() && self.is_near_edge(window, &plant) {
+                &mut scalar
+            } else if plant.is_plain() {
+                &mut batched
+            } else if plant.is_latent_or_regularised() {
+                &mut latent
+            } else {
+                &mut scalar
+            };
             runs.push(Run { plant: &plant, t, torque, state, positions });
         }
         R::plain(&mut batched);
-        R::elastic(&mut elastic);
+        R::latent(&mut latent);
         R::scalar(&mut scalar);
         if hypothesis.distorts() {
             for row in predicted.chunks_exact_mut(N) {
@@ -310,59 +311,6 @@ impl<const N: usize> InitialStateOffset<N> {
 /// Distance beyond a window's measured travel, relative to this travel, within which a prediction may reach a discontinuity of the torque.
 const NEAR_EDGE: f64 = 0.3;
 
-/// Method of simulating the rollouts of many windows.
-trait Rollouts {
-    /// Simulates rollouts of a plant in which nothing but friction modes changes ([`Plant::is_plain`]).
-    fn plain<A: Arm<f64, N, P>, const N: usize, const P: usize>(runs: &mut [Run<'_, f64, A, N, P>]);
-
-    /// Simulates rollouts of a plant with elastic joints or regularised friction ([`Plant::is_elastic_or_regularised`]).
-    fn elastic<A: Arm<f64, N, P>, const N: usize, const P: usize>(runs: &mut [Run<'_, f64, A, N, P>]);
-
-    /// Simulates rollouts of any plant.
-    fn scalar<A: Arm<f64, N, P>, const N: usize, const P: usize>(runs: &mut [Run<'_, f64, A, N, P>]);
-}
-
-/// Rollouts in vector lanes, several at a time.
-struct SideBySide;
-
-impl Rollouts for SideBySide {
-    fn plain<A: Arm<f64, N, P>, const N: usize, const P: usize>(runs: &mut [Run<'_, f64, A, N, P>]) {
-        let level = Level::widest();
-        runs.par_chunks_mut(GROUP).for_each(|runs| BatchRollout { runs, limit: DIVERGED }.run_all(level));
-    }
-
-    fn elastic<A: Arm<f64, N, P>, const N: usize, const P: usize>(runs: &mut [Run<'_, f64, A, N, P>]) {
-        let level = Level::widest();
-        let Some(step_limits) = runs.first().map(|run| step_limits(run.plant)) else { return };
-        runs.par_chunks_mut(GROUP)
-            .for_each(|runs| ElasticRollout { runs, limit: DIVERGED, step_limits }.run_all(level));
-    }
-
-    fn scalar<A: Arm<f64, N, P>, const N: usize, const P: usize>(runs: &mut [Run<'_, f64, A, N, P>]) {
-        runs.par_chunks_mut(WIDTH).for_each(|group| group.iter_mut().for_each(|run| run_scalar(run, false)));
-    }
-}
-
-/// Rollouts one at a time.
-struct Singly;
-
-impl Rollouts for Singly {
-    fn plain<A: Arm<f64, N, P>, const N: usize, const P: usize>(runs: &mut [Run<'_, f64, A, N, P>]) {
-        Self::scalar(runs);
-    }
-
-    fn elastic<A: Arm<f64, N, P>, const N: usize, const P: usize>(runs: &mut [Run<'_, f64, A, N, P>]) {
-        Self::scalar(runs);
-    }
-
-    fn scalar<A: Arm<f64, N, P>, const N: usize, const P: usize>(runs: &mut [Run<'_, f64, A, N, P>]) {
-        runs.par_iter_mut().for_each(|run| run_scalar(run, true));
-    }
-}
-
-/// Number of rollouts simulated as one group over vector lanes: enough that few lanes are idle at the end.
-const GROUP: usize = 4 * WIDTH;
-
 /// Adds latent states to a state whose positions are those that the encoders show: where the encoder is on the motor, the deflection is subtracted
 /// from the shown position to give that of the link.
 pub(crate) fn enter<A: Arm<f64, N, P>, const N: usize, const P: usize>(
@@ -378,54 +326,6 @@ pub(crate) fn enter<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     state.modes = std::array::from_fn(|j| {
         Mode::of(plant.drivetrain().friction_velocity(j, state.dq[j], &state.latent))
     });
-}
-
-/// Simulates one rollout by the scalar integrator, with as many steps per sample as its plant needs; with `resolves_viscous`, steps are short against
-/// the time in which viscous friction stops a joint.
-fn run_scalar<A: Arm<f64, N, P>, const N: usize, const P: usize>(
-    run: &mut Run<'_, f64, A, N, P>,
-    resolves_viscous: bool,
-) {
-    let mut limits = step_limits(run.plant);
-    if resolves_viscous {
-        limits.elsewhere = limits.elsewhere.max(MAX_SUBSTEPS_STIFF);
-    }
-    let measures_motors = run.plant.drivetrain().measures_motors();
-    let state = &mut run.state;
-    for (k, row) in run.positions.chunks_exact_mut(N).enumerate() {
-        let h = run.t[k + 1] - run.t[k];
-        let mut rates = run.plant.step_rates(&state.q);
-        if run.plant.jumps() {
-            rates = rates.max(run.plant.step_rates(&(state.q + state.dq * h)));
-        }
-        if resolves_viscous {
-            rates.elsewhere = rates.elsewhere.max(VISCOUS_STEPS * run.plant.viscous_rate(&state.q));
-        }
-        let interval = Interval { t: run.t[k], h, torque: &run.torque[k] };
-        advance_in_stable_steps(run.plant, state, &interval, &rates, limits);
-        if !state.is_finite() || state.q.amax() > DIVERGED {
-            break;
-        }
-        if measures_motors {
-            row.copy_from_slice(run.plant.drivetrain().shown(&state.q, &state.latent).as_slice());
-        } else {
-            row.copy_from_slice(state.q.as_slice());
-        }
-    }
-}
-
-/// Number of steps, relative to what stability needs, in which a joint is simulated that viscous friction stops within some samples: the speed that
-/// Runge-Kutta leaves after a step is off by 6e-5 of the speed before it, where the longest stable step leaves 5e-2.
-const VISCOUS_STEPS: f64 = 4.0;
-
-/// Largest numbers of sub-steps per sample for a plant.
-fn step_limits<A: Arm<f64, N, P>, const N: usize, const P: usize>(plant: &Plant<f64, A, N, P>) -> StepLimits {
-    let elsewhere = match (plant.jumps(), plant.drivetrain().any()) {
-        (true, _) => MAX_SUBSTEPS_IMPACT,
-        (false, true) => MAX_SUBSTEPS_DRIVEN,
-        (false, false) => 1,
-    };
-    StepLimits { near_standstill: MAX_SUBSTEPS_FRICTION, elsewhere }
 }
 
 #[cfg(test)]

@@ -10,7 +10,7 @@ use crate::likelihood::jacobian::Sensitivities;
 use crate::likelihood::solve::{Effort, Fit, FitProblem};
 use crate::model::hypothesis::Hypothesis;
 use crate::numeric::minimum::minimum;
-use crate::predict::window::MAX_SUBSTEPS_FRICTION;
+use crate::predict::rollouts::MAX_SUBSTEPS_FRICTION;
 use crate::search::acceptance::{ABOVE_FLOOR, is_regularisation};
 use crate::search::attribute::{Candidate, SearchNode};
 use armgap_core::arm::Arm;

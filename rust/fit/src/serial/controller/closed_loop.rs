@@ -7,7 +7,8 @@
 
 use crate::model::hypothesis::{EffectInstance, Hypothesis};
 use crate::predict::log_inputs::LogInputs;
-use crate::predict::window::{DIVERGED, Dataset, Window, enter};
+use crate::predict::rollouts::{DIVERGED, Singly};
+use crate::predict::window::{Dataset, Window, enter};
 use crate::serial::controller::{Given, JointController};
 use armgap_core::arm::Arm;
 use armgap_core::effect::{InputSegment, Quantity, find};
@@ -151,7 +152,7 @@ impl<const N: usize> ClosedLoop<N> {
                 (0..N).map(servo).collect()
             })
             .collect();
-        let inputs = LogInputs::new(data, hypothesis, &plant, None);
+        let inputs = LogInputs::new::<Singly, A, P>(data, hypothesis, &plant, None);
         let mut rest = predicted.as_mut_slice();
         let mut runs = Vec::with_capacity(data.windows.len());
         for window in &data.windows {

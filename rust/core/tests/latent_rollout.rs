@@ -1,11 +1,11 @@
-//! Tests of batch rollouts of plants with elastic joints and regularised friction against the scalar integrator.
+//! Tests of batch rollouts of plants with latent states and regularised friction against the scalar integrator.
 
 use armgap_core::arm::{Pendulum, TwoLink};
 use armgap_core::cpu::Level;
 use armgap_core::effect::{Active, InputSegment, find};
 use armgap_core::integrate::{Interval, State, StepLimits, advance, advance_in_stable_steps};
-use armgap_core::plant::{Plant, StepRates};
-use armgap_core::rollout::{ElasticRollout, Run};
+use armgap_core::plant::{Mode, Plant, StepRates};
+use armgap_core::rollout::{Correction, LatentRollout, Run};
 use armgap_core::transmission::Sides;
 use nalgebra::{Vector1, Vector2};
 
@@ -61,8 +61,8 @@ fn rows(run: usize) -> usize {
     (ROWS * (run % 4)) / 3
 }
 
-/// Positions that the encoders show in a run of the scalar integrator.
-fn alone(plant: &Arm, run: usize) -> Vec<f64> {
+/// Positions that the encoders show in a run of the scalar integrator, with the state at every sample corrected by `correction`.
+fn alone(plant: &Arm, run: usize, mut correction: Option<&mut dyn Correction<f64, 2>>) -> Vec<f64> {
     let (t, torque) = (times(), torques(run));
     let mut state = start(run);
     let mut shown = Vec::new();
@@ -71,37 +71,58 @@ fn alone(plant: &Arm, run: usize) -> Vec<f64> {
         let (interval, rates) = (Interval { t: t[k], h, torque: &torque[k] }, plant.step_rates(&state.q));
         advance_in_stable_steps(plant, &mut state, &interval, &rates, LIMITS);
         shown.extend(plant.drivetrain().shown(&state.q, &state.latent).iter());
+        if let Some(correction) = &mut correction {
+            correction.correct(run, &mut state);
+        }
     }
     shown
 }
 
-/// Largest distance of the runs side by side from those alone, rad.
-fn distance(plant: &Arm, level: Level) -> f64 {
+/// Positions of the runs side by side, each with its own plant, with the states corrected by `correction`.
+fn side_by_side(
+    plants: &[Arm],
+    level: Level,
+    correction: Option<&mut dyn Correction<f64, 2>>,
+) -> Vec<Vec<f64>> {
     let (t, torques): (_, Vec<_>) = (times(), (0..RUNS).map(torques).collect());
     let mut out = vec![vec![f64::NAN; 2 * ROWS]; RUNS];
     let mut runs: Vec<_> = out
         .iter_mut()
         .enumerate()
         .map(|(run, positions)| Run {
-            plant,
+            plant: &plants[run % plants.len()],
             t: &t[..=rows(run)],
             torque: &torques[run][..rows(run)],
             state: start(run),
             positions: &mut positions[..2 * rows(run)],
         })
         .collect();
-    ElasticRollout { runs: &mut runs, limit: 1e3, step_limits: LIMITS }.run_all(level);
+    let correction = correction.map(|correction| correction as &mut dyn Correction<f64, 2>);
+    LatentRollout { runs: &mut runs, limit: 1e3, step_limits: LIMITS, correction }.run_all(level);
+    out
+}
+
+/// Largest distance between the positions of two runs, rad; NaN if one is not finite.
+fn apart(one: &[f64], other: &[f64]) -> f64 {
+    let apart = one.iter().zip(other).map(|(a, b)| (a - b).abs());
+    apart.fold(0.0, |most, x| if x > most || x.is_nan() { x } else { most })
+}
+
+/// Largest distance of the runs side by side from those alone, rad.
+fn distance(plant: &Arm, level: Level) -> f64 {
+    let out = side_by_side(std::slice::from_ref(plant), level, None);
     let mut most = 0.0_f64;
     for (run, positions) in out.iter().enumerate() {
-        let apart = positions.iter().zip(alone(plant, run)).map(|(a, b)| (a - b).abs());
-        most = apart.fold(most, |most, x| if x > most || x.is_nan() { x } else { most });
+        let alone = alone(plant, run, None);
         assert!(positions[2 * rows(run)..].iter().all(|q| q.is_nan()), "run {run} went on");
+        let off = apart(&positions[..alone.len()], &alone);
+        most = if off > most || off.is_nan() { off } else { most };
     }
     most
 }
 
 fn assert_same(plant: &Arm, what: &str) {
-    assert!(plant.is_elastic_or_regularised(), "{what}");
+    assert!(plant.is_latent_or_regularised(), "{what}");
     for level in [Level::PORTABLE, Level::detect(), Level::widest()] {
         let off = distance(plant, level);
         assert!(off < 1e-9, "{what}, {}: {off:e}", level.name());
@@ -133,6 +154,94 @@ fn elastic_joints_in_lanes_move_as_in_one_run() {
     }
 }
 
+/// Backlash of a joint, with a rotor that is a part of the link's inertia.
+fn backlash(joint: usize, sides: Sides) -> Arm {
+    let p = if joint == 0 { [0.04, 0.3, 0.6] } else { [0.06, 0.3, 0.0] };
+    with(arm(), "backlash", joint, p).with_sides(joint, sides).expect("a joint of the arm")
+}
+
+#[test]
+fn backlash_in_lanes_closes_and_opens_as_in_one_run() {
+    for (joint, sides) in [0, 1].into_iter().flat_map(|j| SIDES.map(|sides| (j, sides))) {
+        let plant = backlash(joint, sides);
+        assert_same(&plant, &format!("joint {joint}, {sides:?}"));
+        assert_same(
+            &plant.clone().with_rounding([0.05, 0.03]),
+            &format!("joint {joint}, {sides:?}, regularised"),
+        );
+        assert_same(
+            &with(plant, "joint_elasticity", 1 - joint, [600.0, 2.0, 0.02]),
+            &format!("both, {sides:?}"),
+        );
+    }
+}
+
+#[test]
+fn hysteresis_in_lanes_is_that_of_one_run() {
+    for joint in [0, 1] {
+        let presliding = |plant| with(plant, "presliding", joint, [1.5, 80.0, 0.0]);
+        assert_same(&presliding(arm()), "exact friction");
+        assert_same(&presliding(arm().with_rounding([0.05, 0.03])), "regularised");
+        assert_same(&presliding(elastic(1, Sides::MOTOR)), "elastic");
+        assert_same(&presliding(backlash(1, Sides::MOTOR)), "backlash");
+    }
+}
+
+/// Torques that jump at a position act in the step in which they are met.
+#[test]
+fn joint_limits_in_lanes_are_met_as_in_one_run() {
+    for plant in [elastic(1, Sides::MOTOR), backlash(1, Sides::LINK), arm().with_rounding([0.05, 0.03])] {
+        for p in [[0.4, 300.0, 3.0], [-0.6, 200.0, 2.0]] {
+            let plant = with(plant.clone(), "contact", 1, p);
+            assert!(plant.jumps());
+            let out = side_by_side(std::slice::from_ref(&plant), Level::widest(), None);
+            // Whether the spring of the limit is followed in short steps is decided anew at each sample: by the state there alone.
+            let off = (0..RUNS).map(|run| apart(&out[run][..2 * rows(run)], &alone(&plant, run, None)));
+            assert!(off.fold(0.0, f64::max) < 1e-9);
+        }
+    }
+}
+
+/// Correction that moves every state, in a different way in every run and at every sample.
+struct Nudge([usize; RUNS]);
+
+impl Correction<f64, 2> for Nudge {
+    fn correct(&mut self, run: usize, state: &mut State<f64, 2>) {
+        self.0[run] += 1;
+        let x = (1 + run) as f64 * self.0[run] as f64;
+        state.q[0] += 1e-3 * x.sin();
+        state.dq[1] += 1e-2 * x.cos();
+        state.latent.deflection_rate[1] *= 0.9;
+        state.modes = std::array::from_fn(|j| Mode::of(state.dq[j]));
+    }
+}
+
+#[test]
+fn plants_of_other_values_run_side_by_side_with_corrections() {
+    let of = |i: usize| {
+        let x = 1.0 + 0.1 * i as f64;
+        let mut theta = THETA;
+        theta.iter_mut().for_each(|value| *value *= x.sqrt());
+        Plant::new(TwoLink::new(9.81, Some(0.45), &theta), theta)
+    };
+    let elastic = |i: usize| with(of(i), "joint_elasticity", 1, [150.0 + 20.0 * i as f64, 0.5, 0.012]);
+    let backlash = |i: usize| with(of(i), "backlash", 1, [0.06 + 0.01 * i as f64, 0.3, 0.0]);
+    let presliding = |i: usize| with(of(i), "presliding", 1, [1.5 + 0.2 * i as f64, 80.0, 0.0]);
+    let rounded = |i: usize| of(i).with_rounding([0.05 + 0.01 * i as f64, 0.03]);
+    for sides in SIDES {
+        for plant in [&elastic as &dyn Fn(usize) -> Arm, &backlash, &presliding, &rounded] {
+            let plants: Vec<Arm> =
+                (0..5).map(|i| plant(i).with_sides(1, sides).expect("a joint of the arm")).collect();
+            let out = side_by_side(&plants, Level::widest(), Some(&mut Nudge([0; RUNS])));
+            for run in 0..RUNS {
+                let alone = alone(&plants[run % 5], run, Some(&mut Nudge([0; RUNS])));
+                let off = apart(&out[run][..alone.len()], &alone);
+                assert!(off < 1e-9, "run {run}, {sides:?}: {off:e}");
+            }
+        }
+    }
+}
+
 #[test]
 fn effects_act_beside_elastic_joints_and_regularised_friction() {
     let effects = [
@@ -148,6 +257,7 @@ fn effects_act_beside_elastic_joints_and_regularised_friction() {
     for (name, joint, p) in effects {
         for sides in [Sides::LINK, Sides::MOTOR] {
             assert_same(&with(elastic(joint, sides), name, joint, p), &format!("{name} {joint} {sides:?}"));
+            assert_same(&with(backlash(joint, sides), name, joint, p), &format!("{name} {joint} {sides:?}"));
         }
         assert_same(&with(arm().with_rounding([0.05, 0.03]), name, joint, p), name);
     }
@@ -165,7 +275,8 @@ fn a_run_that_leaves_the_limit_ends_alone() {
         .zip(&torques)
         .map(|(positions, torque)| Run { plant: &plant, t: &t, torque, state: start(1), positions })
         .collect();
-    ElasticRollout { runs: &mut runs, limit: 1e3, step_limits: LIMITS }.run_all(Level::widest());
+    LatentRollout { runs: &mut runs, limit: 1e3, step_limits: LIMITS, correction: None }
+        .run_all(Level::widest());
     assert!(out[2][99].is_finite() && out[2][100].is_nan());
     assert!(out[5][2 * ROWS - 1].is_nan(), "what is thrown off goes on");
     for run in [0, 1, 3, 4, 6, 7] {
@@ -219,7 +330,8 @@ fn an_elastic_pendulum_obeys_the_equations_in_its_motors_position() {
     let mut positions = vec![f64::NAN; ROWS];
     let state = State::new(Vector1::new(0.3), Vector1::new(0.5));
     let run = Run { plant: &plant, t: &t, torque: &held[..ROWS], state, positions: &mut positions };
-    ElasticRollout { runs: &mut [run], limit: 1e3, step_limits: LIMITS }.run_all(Level::widest());
+    LatentRollout { runs: &mut [run], limit: 1e3, step_limits: LIMITS, correction: None }
+        .run_all(Level::widest());
     let expected = elastic_pendulum(theta, shaft, width, torque);
     let most = positions.iter().zip(&expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     let travel = expected.iter().fold(0.0_f64, |most, q| most.max((q - 0.3).abs()));
@@ -235,7 +347,7 @@ fn friction_over_narrow_widths_is_stable_near_standstill() {
         for run in 1..8 {
             let (torque, mut fine) = (torques(run), start(run));
             let begin = fine.q;
-            for (k, shown) in alone(&plant, run).chunks_exact(2).enumerate() {
+            for (k, shown) in alone(&plant, run, None).chunks_exact(2).enumerate() {
                 let interval = Interval { t: t[k], h: t[k + 1] - t[k], torque: &torque[k] };
                 advance(&plant, &mut fine, &interval, 400);
                 worst = worst.max((shown[0] - fine.q[0]).abs().max((shown[1] - fine.q[1]).abs()));

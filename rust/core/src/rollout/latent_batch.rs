@@ -1,10 +1,11 @@
-//! Batch rollouts of one plant with elastic joints or regularised friction: one run in each lane of a vector unit.
+//! Batch rollouts of plants with latent states or regularised friction: one run in each lane of a vector unit.
 //!
 //! Every lane divides its sample intervals into as many steps as keep Runge-Kutta stable, as [`crate::integrate::advance_in_stable_steps`] does. A
-//! step in which the friction mode of a joint changes is left to the scalar integrator ([`crate::integrate`]), in its lane alone.
+//! step in which the friction mode of a joint changes, or in which backlash closes or opens, is left to the scalar integrator
+//! ([`crate::integrate`]), in its lane alone.
 
 use super::cursor::{RunCursor, lane_values};
-use super::elastic_lanes::{ElasticLanes, ElasticModes, ElasticSpan, ElasticState};
+use super::latent_lanes::{LatentLaneState, LatentLanes, LatentModes, LatentSpan};
 use super::{Run, WIDTH};
 use crate::arm::Arm;
 use crate::cpu::{Cpu, Kernel, Level};
@@ -18,30 +19,39 @@ use crate::real::{Real, lit};
 use core::array::from_fn;
 use nalgebra::SVector;
 
-/// Batch of runs of one plant ([`crate::plant::Plant::is_elastic_or_regularised`]), simulated [`WIDTH`] at a time; a run ends where a joint position
-/// exceeds `limit`, rad or m, or is NaN. The positions of the runs are those that the encoders show.
-pub struct ElasticRollout<'r, 'a, T: Real, A, const N: usize, const P: usize> {
-    /// Runs of the batch, all of the same plant.
+/// Correction of the states that runs reach at their samples, such as by what was measured there.
+pub trait Correction<T: Real, const N: usize> {
+    /// Corrects the state that the run with the index `run` has reached at its next sample; the run goes on from there.
+    fn correct(&mut self, run: usize, state: &mut State<T, N>);
+}
+
+/// Batch of runs of plants ([`crate::plant::Plant::is_latent_or_regularised`]), simulated [`WIDTH`] at a time; without a
+/// correction a run ends where a joint position exceeds `limit`, rad or m, or is NaN. The positions of the runs are those that the encoders show,
+/// before a correction.
+pub struct LatentRollout<'r, 'a, T: Real, A, const N: usize, const P: usize> {
+    /// Runs of the batch, whose plants differ in values alone: all have the same transmissions, effects and joints with regularised friction.
     pub runs: &'r mut [Run<'a, T, A, N, P>],
     /// Largest size of a joint position, rad or m, beyond which a run ends.
     pub limit: T,
     /// Largest numbers of steps in one sample interval.
     pub step_limits: StepLimits,
+    /// Correction of the states at the samples, if any.
+    pub correction: Option<&'r mut dyn Correction<T, N>>,
 }
 
-impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> ElasticRollout<'_, '_, T, A, N, P> {
+impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> LatentRollout<'_, '_, T, A, N, P> {
     /// Simulates all runs with the instruction set `level`.
     pub fn run_all(self, level: Level) {
         level.run_wide(self);
     }
 }
 
-impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Kernel for ElasticRollout<'_, '_, T, A, N, P> {
+impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Kernel for LatentRollout<'_, '_, T, A, N, P> {
     type Output = ();
 
     #[inline(always)]
     fn run<C: Cpu>(self) {
-        let Some(mut batch) = ElasticBatch::<T, C, A, WIDTH, N, P>::new(self) else { return };
+        let Some(mut batch) = LatentBatch::<T, C, A, WIDTH, N, P>::new(self) else { return };
         while batch.moving > 0 {
             batch.step();
         }
@@ -49,12 +59,12 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Kernel for Elasti
 }
 
 /// State of all lanes of a batch.
-struct ElasticBatch<'r, 'a, T: Real, C, A, const W: usize, const N: usize, const P: usize> {
-    rollout: ElasticRollout<'r, 'a, T, A, N, P>,
-    lanes: ElasticLanes<'a, T, C, A, W, N, P>,
-    state: ElasticState<Lanes<T, C, W>, N>,
-    modes: ElasticModes<Lanes<T, C, W>, N>,
-    span: ElasticSpan<Lanes<T, C, W>, N>,
+struct LatentBatch<'r, 'a, T: Real, C, A, const W: usize, const N: usize, const P: usize> {
+    rollout: LatentRollout<'r, 'a, T, A, N, P>,
+    lanes: LatentLanes<'a, T, C, A, W, N, P>,
+    state: LatentLaneState<Lanes<T, C, W>, N>,
+    modes: LatentModes<Lanes<T, C, W>, N>,
+    span: LatentSpan<Lanes<T, C, W>, N>,
     /// Division of each lane's sample interval.
     divisions: [Division<T>; W],
     /// Whether each lane starts a sample interval.
@@ -69,19 +79,24 @@ struct ElasticBatch<'r, 'a, T: Real, C, A, const W: usize, const N: usize, const
 }
 
 impl<'r, 'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, const P: usize>
-    ElasticBatch<'r, 'a, T, C, A, W, N, P>
+    LatentBatch<'r, 'a, T, C, A, W, N, P>
 {
     #[inline(always)]
-    fn new(rollout: ElasticRollout<'r, 'a, T, A, N, P>) -> Option<Self> {
+    fn new(rollout: LatentRollout<'r, 'a, T, A, N, P>) -> Option<Self> {
         let plant = rollout.runs.first()?.plant;
         let (zero, one) = (Lanes::of(T::zero()), Lanes::of(T::one()));
         let joints = JointState { q: [zero; N], dq: [zero; N] };
         let mut batch = Self {
             rollout,
-            lanes: ElasticLanes::new(plant),
-            state: ElasticState { joints, deflection: [zero; N], deflection_rate: [zero; N] },
-            modes: ElasticModes { direction: [one; N], any_stuck: false },
-            span: ElasticSpan { t: zero, h: zero, tau: [[zero; N]; 3] },
+            lanes: LatentLanes::new(plant),
+            state: LatentLaneState {
+                joints,
+                deflection: [zero; N],
+                deflection_rate: [zero; N],
+                memory: [zero; N],
+            },
+            modes: LatentModes { direction: [one; N], side: [zero; N], any_stuck: false },
+            span: LatentSpan { t: zero, h: zero, tau: [[zero; N]; 3] },
             divisions: [Division::empty(); W],
             at_sample: [false; W],
             runs: [0; W],
@@ -114,7 +129,7 @@ impl<'r, 'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, c
             if self.cursors[l].is_none() {
                 continue;
             }
-            let holds = step.violation.0[l] <= T::zero();
+            let holds = step.violation.0[l] <= T::zero() && !self.crosses_edge(l, &start);
             if !holds {
                 self.put(l, &start);
                 self.take_alone(l);
@@ -127,11 +142,22 @@ impl<'r, 'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, c
         }
     }
 
+    /// Whether a joint of lane `l` crosses a position at which its torque jumps, on the way from the state `start`.
+    #[inline(always)]
+    fn crosses_edge(&self, l: usize, start: &LatentLaneState<Lanes<T, C, W>, N>) -> bool {
+        let plant = self.lanes.plant(l);
+        let crosses = |j: usize| {
+            let [from, to] = [start, &self.state].map(|state| state.joints.q[j].0[l]);
+            plant.edge_between(j, from, to).is_some()
+        };
+        plant.jumps() && (0..N).any(crosses)
+    }
+
     /// Divides the intervals that lanes start into steps; `free` is each joint's inertia with all other joints free to move.
     #[inline(never)]
     fn start_intervals(&mut self, free: &[Lanes<T, C, W>; N]) {
-        let plant = self.lanes.plant();
         for l in 0..W {
+            let plant = self.lanes.plant(l);
             let Some(RunCursor { interval: Some(interval), .. }) = &self.cursors[l] else { continue };
             if !self.at_sample[l] {
                 continue;
@@ -171,7 +197,7 @@ impl<'r, 'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, c
     #[inline(never)]
     fn take_alone(&mut self, l: usize) {
         let Some(RunCursor { interval: Some(interval), .. }) = &self.cursors[l] else { return };
-        let plant = self.lanes.plant();
+        let plant = self.lanes.plant(l);
         let (start, events) = (self.state_of(l), self.divisions[l].events);
         let mut state = start;
         substep(plant, &mut state, interval, &mut self.divisions[l]);
@@ -189,17 +215,18 @@ impl<'r, 'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, c
         if self.divisions[l].next() {
             return self.set_span(l);
         }
-        let JointState { q, dq } = &self.state.joints;
-        let (q, dq): ([T; N], [T; N]) = (lane_values(q, l), lane_values(dq, l));
-        let within = q.iter().all(|q| q.abs() <= self.rollout.limit)
-            && dq.iter().all(nalgebra::ComplexField::is_finite);
-        if within && let Some(cursor) = &mut self.cursors[l] {
-            let drivetrain = self.lanes.plant().drivetrain();
-            let deflection: [T; N] = lane_values(&self.state.deflection, l);
-            cursor.arrive(from_fn(|j| {
-                if drivetrain.sides(j).encoder_at_motor { q[j] + deflection[j] } else { q[j] }
-            }));
-            if cursor.interval.is_some() {
+        let mut state = self.state_of(l);
+        let within = state.is_finite() && state.q.iter().all(|q| q.abs() <= self.rollout.limit);
+        if (within || self.rollout.correction.is_some())
+            && let Some(cursor) = &mut self.cursors[l]
+        {
+            cursor.arrive(self.lanes.plant(l).drivetrain().shown(&state.q, &state.latent).into());
+            let goes_on = cursor.interval.is_some();
+            if let Some(correction) = &mut self.rollout.correction {
+                correction.correct(self.runs[l], &mut state);
+                self.set(l, &state);
+            }
+            if goes_on {
                 self.at_sample[l] = true;
                 return;
             }
@@ -220,6 +247,7 @@ impl<'r, 'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, c
             self.cursors[l] = RunCursor::of(run);
             if self.cursors[l].is_some() {
                 self.at_sample[l] = true;
+                self.lanes.put(l, self.rollout.runs[self.runs[l]].plant);
                 return self.set(l, &state);
             }
         }
@@ -232,36 +260,42 @@ impl<'r, 'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, c
     /// State of lane `l`.
     #[inline]
     fn state_of(&self, l: usize) -> State<T, N> {
-        let ElasticState { joints, deflection, deflection_rate } = &self.state;
+        let LatentLaneState { joints, deflection, deflection_rate, memory } = &self.state;
         let mut state =
             State::new(SVector::from(lane_values(&joints.q, l)), SVector::from(lane_values(&joints.dq, l)));
         state.modes = lane_values(&self.modes.direction, l).map(Mode::of);
         state.latent.deflection = lane_values(deflection, l).into();
         state.latent.deflection_rate = lane_values(deflection_rate, l).into();
+        state.latent.memory = lane_values(memory, l).into();
+        state.latent.side = lane_values(&self.modes.side, l).into();
         state
     }
 
     /// Sets the state of lane `l` to that of the same lane in `other`.
     #[inline]
-    fn put(&mut self, l: usize, other: &ElasticState<Lanes<T, C, W>, N>) {
+    fn put(&mut self, l: usize, other: &LatentLaneState<Lanes<T, C, W>, N>) {
         for j in 0..N {
             self.state.joints.q[j].0[l] = other.joints.q[j].0[l];
             self.state.joints.dq[j].0[l] = other.joints.dq[j].0[l];
             self.state.deflection[j].0[l] = other.deflection[j].0[l];
             self.state.deflection_rate[j].0[l] = other.deflection_rate[j].0[l];
+            self.state.memory[j].0[l] = other.memory[j].0[l];
         }
     }
 
     /// Sets the state of lane `l`.
     #[inline]
     fn set(&mut self, l: usize, state: &State<T, N>) {
-        let plant = self.lanes.plant();
+        let plant = self.lanes.plant(l);
+        let memory = plant.memory(&state.q, &state.latent);
         self.modes.any_stuck = false;
         for j in 0..N {
             self.state.joints.q[j].0[l] = state.q[j];
             self.state.joints.dq[j].0[l] = state.dq[j];
             self.state.deflection[j].0[l] = state.latent.deflection[j];
             self.state.deflection_rate[j].0[l] = state.latent.deflection_rate[j];
+            self.state.memory[j].0[l] = memory[j];
+            self.modes.side[j].0[l] = state.latent.side[j];
             self.modes.direction[j].0[l] =
                 if plant.is_rounded(j) { T::one() } else { state.modes[j].direction() };
             self.modes.any_stuck |= self.modes.direction[j].any_zero();
