@@ -227,9 +227,9 @@ fn plants_of_other_values_run_side_by_side_with_corrections() {
     let elastic = |i: usize| with(of(i), "joint_elasticity", 1, [150.0 + 20.0 * i as f64, 0.5, 0.012]);
     let backlash = |i: usize| with(of(i), "backlash", 1, [0.06 + 0.01 * i as f64, 0.3, 0.0]);
     let presliding = |i: usize| with(of(i), "presliding", 1, [1.5 + 0.2 * i as f64, 80.0, 0.0]);
-    let rounded = |i: usize| of(i).with_rounding([0.05 + 0.01 * i as f64, 0.03]);
+    let regularised = |i: usize| of(i).with_rounding([0.05 + 0.01 * i as f64, 0.03]);
     for sides in SIDES {
-        for plant in [&elastic as &dyn Fn(usize) -> Arm, &backlash, &presliding, &rounded] {
+        for plant in [&elastic as &dyn Fn(usize) -> Arm, &backlash, &presliding, &regularised] {
             let plants: Vec<Arm> =
                 (0..5).map(|i| plant(i).with_sides(1, sides).expect("a joint of the arm")).collect();
             let out = side_by_side(&plants, Level::widest(), Some(&mut Nudge([0; RUNS])));

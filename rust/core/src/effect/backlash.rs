@@ -52,6 +52,11 @@ impl<T: Real> Effect<T> for Backlash {
         true
     }
 
+    /// The motor travels the width of the backlash without its link.
+    fn at_share(&self, p: &[T; MAX_PARAMETERS], share: T) -> [T; MAX_PARAMETERS] {
+        [p[0] * share, p[1], p[2]]
+    }
+
     fn transmission(&self, p: &[T; MAX_PARAMETERS], inertia: T) -> Option<Transmission<T>> {
         let rotor = p[1] * inertia;
         let rate = lit::<T>(FLANK_RATE);

@@ -54,6 +54,11 @@ impl<T: Real> Effect<T> for JointElasticity {
         true
     }
 
+    /// Deflection is torque over stiffness, so the share is one of the compliance; the time constant of the damping stays.
+    fn at_share(&self, p: &[T; MAX_PARAMETERS], share: T) -> [T; MAX_PARAMETERS] {
+        [p[0] / share, p[1] / share, p[2]]
+    }
+
     fn transmission(&self, p: &[T; MAX_PARAMETERS], _inertia: T) -> Option<Transmission<T>> {
         let rigid = p[0] >= lit(NEVER);
         (!rigid).then_some(Transmission {

@@ -248,6 +248,11 @@ pub trait Effect<T: Real>: Sync {
         None
     }
 
+    /// Parameters at which the effect changes the motion by about `share`, 0 to 1, of its whole change at `p`; `p` where these are not known.
+    fn at_share(&self, p: &[T; MAX_PARAMETERS], _share: T) -> [T; MAX_PARAMETERS] {
+        *p
+    }
+
     /// Torque that the effect adds to the actuator's, N m (N).
     fn force(&self, _p: &[T; MAX_PARAMETERS], _x: &JointPoint<T>) -> T {
         T::zero()

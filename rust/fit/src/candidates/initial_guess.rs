@@ -68,12 +68,15 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             _ if size < CONSEQUENTIAL_ERROR => TRACE_IN_SMALL * self.above_floor(training, weights),
             _ => TRACE * training,
         };
-        let more = promising(&screening.tests, least).into_iter().map(|found| {
+        let promising = promising(&screening.tests, least);
+        let more = promising.iter().map(|found| {
             let effect = found.effect;
             self.payload_guess(&fit.hypothesis, effect)
                 .unwrap_or_else(|| self.compensated(&fit.hypothesis, found))
         });
         let mut initial_guesses: Vec<Hypothesis<P>> = more.collect();
+        let far = promising.iter().filter_map(|found| found.suggested());
+        initial_guesses.extend(far.map(|effect| fit.hypothesis.with(effect)));
         if !is_plausible::<P>(fit.prior_cost) {
             // A contact that carries a part of the load all the time has biased the parameters that were fitted without it.
             let trusted = Hypothesis { theta: self.prior.theta, ..fit.hypothesis.clone() };
@@ -310,6 +313,7 @@ mod tests {
             information_sigma: 0.0,
             imitation: Vec::new(),
             size: 0.0,
+            share: 1.0,
             tested: 0,
             distinct: 0.0,
         }

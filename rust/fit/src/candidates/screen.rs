@@ -24,6 +24,14 @@ const MOTOR_GUESSES: usize = 3;
 /// model has no effects.
 const MIXED_GUESSES: usize = 2;
 
+/// Least share of an effect with a threshold that a score test suggests: below it the initial guess is too far from the effect for its trace to say more
+/// than that the effect is smaller.
+const MIN_SUGGESTED_SHARE: f64 = 0.02;
+
+/// Share of an effect with a threshold below which the size that a score test suggests is an initial guess of its own; initial guesses of shafts of
+/// equal rotors are a factor of three to four apart in stiffness.
+const FAR_SHARE: f64 = 0.25;
+
 /// Score test of a candidate at one initial guess.
 #[derive(Debug, Clone)]
 pub struct ScoreTest {
@@ -41,6 +49,9 @@ pub struct ScoreTest {
     pub imitation: Vec<f64>,
     /// Deviation of the tested parameter from neutral that the score test suggests, within the parameter's bounds.
     pub size: f64,
+    /// Share, 0 to 1, of the whole change of the predictions by an effect with a threshold that the residual shows; 1 for other effects, and where the
+    /// whole change removes more of the cost.
+    pub share: f64,
     /// Index of the candidate's parameter that the score test displaces.
     pub tested: usize,
     /// Share, 0 to 1, of the candidate's squared sensitivity that the model's free values cannot imitate.
@@ -221,7 +232,10 @@ impl<'a, A: Arm<f64, N, P>, const N: usize, const P: usize> TestPoint<'a, A, N, 
             // An effect with a threshold may act in few windows, whose robust weights are nearly zero until the effect explains their residuals.
             if effect.law.spec().trial == Trial::Whole {
                 let there: Vec<f64> = self.residual.iter().zip(trace).map(|(here, t)| here - t).collect();
-                test.gain = test.gain.max(before - self.student_t_total(&there));
+                let whole = before - self.student_t_total(&there);
+                test.share =
+                    if test.gain > whole { test.estimate.clamp(MIN_SUGGESTED_SHARE, 1.0) } else { 1.0 };
+                test.gain = test.gain.max(whole);
             }
             test
         };
@@ -288,12 +302,19 @@ fn scored(effect: &EffectInstance, raw: f64, information: f64, slope: f64, scatt
         information_sigma: 1.0 / information.sqrt(),
         imitation: Vec::new(),
         size: 0.0,
+        share: 1.0,
         tested: tested(effect),
         distinct: if raw > 0.0 { information / raw } else { 0.0 },
     }
 }
 
 impl ScoreTest {
+    /// The effect of the size that the score test suggests, if that is far from the initial guess and known.
+    pub(crate) fn suggested(&self) -> Option<EffectInstance> {
+        let p = self.effect.law.at_share(&self.effect.p, self.share);
+        (self.share < FAR_SHARE && p != self.effect.p).then_some(EffectInstance { p, ..self.effect })
+    }
+
     /// Deviation of the suggested tested parameter from neutral, in the unit of the score test.
     fn admissible(&self, candidate: &EffectInstance) -> f64 {
         let i = tested(candidate);
@@ -328,6 +349,21 @@ mod tests {
         let count = |wanted: Sides| own.iter().filter(|s| **s == wanted).count();
         let [link, motor] = [Sides::LINK, Sides::MOTOR].map(count);
         [link, motor, own.len() - link - motor]
+    }
+
+    /// A score test of a transmission of which the residual shows a part suggests a stiffer shaft, or a narrower backlash; other effects have no share.
+    #[test]
+    fn a_share_of_a_transmission_is_a_share_of_its_compliance_or_width() {
+        let suggested = |name: &str, p: [f64; 3], share: f64| {
+            let law = armgap_core::effect::find::<f64>(name).expect("known");
+            let mut test = scored(&EffectInstance::new(law, 1, p), 1.0, 1.0, 0.25, 1.0);
+            test.share = share;
+            test.suggested().map(|effect| effect.p)
+        };
+        assert_eq!(suggested("joint_elasticity", [20.0, 0.1, 0.003], 0.125), Some([160.0, 0.8, 0.003]));
+        assert_eq!(suggested("backlash", [0.04, 0.1, 0.5], 0.125), Some([0.005, 0.1, 0.5]));
+        assert_eq!(suggested("contact", [0.4, 50.0, 1.0], 0.125), None);
+        assert_eq!(suggested("joint_elasticity", [20.0, 0.1, 0.003], 0.5), None);
     }
 
     #[test]

@@ -168,7 +168,8 @@ impl<const P: usize> Hypothesis<P> {
         let plant = Plant::new(arm.clone(), self.theta).with_rounding(widths);
         self.effects.iter().try_fold(plant, |plant, e| {
             let plant = plant.with_effect(Active { law: e.law, joint: e.joint, p: e.p })?;
-            if e.sides == Sides::LINK { Some(plant) } else { plant.with_sides(e.joint, e.sides) }
+            // Of two transmissions on one joint the later one counts, with its own sides.
+            if e.law.has_transmission() { plant.with_sides(e.joint, e.sides) } else { Some(plant) }
         })
     }
 
@@ -229,5 +230,26 @@ impl<const P: usize> Hypothesis<P> {
     /// Whether any effect of the hypothesis changes what the encoders show.
     pub fn distorts(&self) -> bool {
         self.effects.iter().any(|e| e.law.spec().hooks.measured)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use armgap_core::arm::Pendulum;
+    use armgap_core::effect::find;
+
+    #[test]
+    fn the_later_of_two_transmissions_on_a_joint_has_its_own_sides() {
+        let effect = |name: &str, p: [f64; 3], sides: Sides| {
+            EffectInstance::new(find(name).expect("known"), 0, p).with_sides(sides)
+        };
+        let slack = effect("backlash", [0.02, 0.1, 0.5], Sides::MOTOR);
+        for sides in [Sides::LINK, Sides::MOTOR] {
+            let shaft = effect("joint_elasticity", [60.0, 0.05, 0.02], sides);
+            let both = Hypothesis::rigid([0.1, 1.0, 0.05, 0.1]).with(slack).with(shaft);
+            let plant = both.plant::<_, 1>(&Pendulum { gravity: 9.81 }).expect("two effects");
+            assert_eq!(plant.drivetrain().sides(0), sides);
+        }
     }
 }

@@ -169,8 +169,8 @@ fn latent<R: Rollouts, A: Arm<f64, N, P>, const N: usize, const P: usize>(
         simulated.iter().enumerate().filter(|(_, (plant, _))| plant.has_latent_states())
     {
         for (index, track) in data.tracks.iter().enumerate() {
-            let starts = data.windows.iter().filter(|w| w.track == index).map(|w| w.first);
-            if let Some(last) = starts.max() {
+            let first_samples = data.windows.iter().filter(|w| w.track == index).map(|w| w.first);
+            if let Some(last) = first_samples.max() {
                 let torque = torques[index].as_deref().unwrap_or(&track.held);
                 places.push((i, index));
                 runs.push(LatentRun { track, plant, torque, last });

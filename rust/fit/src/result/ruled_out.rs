@@ -316,6 +316,7 @@ mod tests {
             sigma: 0.1,
             information_sigma: sigma,
             imitation: Vec::new(),
+            share: 1.0,
             size: estimate,
             tested: 0,
             distinct: 0.5,
