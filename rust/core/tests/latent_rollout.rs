@@ -220,8 +220,7 @@ impl Correction<f64, 2> for Nudge {
 fn plants_of_other_values_run_side_by_side_with_corrections() {
     let of = |i: usize| {
         let x = 1.0 + 0.1 * i as f64;
-        let mut theta = THETA;
-        theta.iter_mut().for_each(|value| *value *= x.sqrt());
+        let theta = THETA.map(|value| value * x.sqrt());
         Plant::new(TwoLink::new(9.81, Some(0.45), &theta), theta)
     };
     let elastic = |i: usize| with(of(i), "joint_elasticity", 1, [150.0 + 20.0 * i as f64, 0.5, 0.012]);

@@ -131,7 +131,7 @@ impl<'a, A: Arm<f64, N, P>, const N: usize, const P: usize> Insertion<'a, A, N, 
 
     /// Part of the correction of the simulated deflection of joint `j`, whose encoder is on its motor, to that by the motor's torque balance that is
     /// made at a sample after the first, rad or m; zero where the motor may stick.
-    fn from_balance(&self, j: usize, latent: &LatentState<f64, N>) -> f64 {
+    fn balance_correction(&self, j: usize, latent: &LatentState<f64, N>) -> f64 {
         let LatentRun { track, plant, torque, .. } = self.run;
         let (path, k) = (track.path(), self.states.len());
         let sample = Motor { path: [&path[k - 1], &path[k]], h: track.t[k] - track.t[k - 1], j };
@@ -160,7 +160,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Correction<f64, N> for I
             if drivetrain.sides(j).encoder_at_motor {
                 (now.latent.deflection[j], now.latent.deflection_rate[j]) = (at - now.q[j], rate - now.dq[j]);
                 if k > 0 && transmission.backlash <= 0.0 {
-                    now.latent.deflection[j] += self.from_balance(j, &now.latent);
+                    now.latent.deflection[j] += self.balance_correction(j, &now.latent);
                     now.q[j] = at - now.latent.deflection[j];
                 }
             } else {

@@ -18,6 +18,10 @@ use std::sync::Arc;
 /// Torques of one log that reach the joints, sample by sample.
 type Torques<const N: usize> = Vec<[InputSegment<f64>; N]>;
 
+/// A plant, and the torques of all logs that reach its joints.
+type UnderTorques<'a, A, const N: usize, const P: usize> =
+    (&'a Plant<f64, A, N, P>, &'a [Option<Torques<N>>]);
+
 /// Latent states of all logs, sample by sample.
 type LatentStates<const N: usize> = Vec<Option<Vec<LatentState<f64, N>>>>;
 
@@ -73,7 +77,8 @@ impl<const N: usize> LogInputs<N> {
     ) -> Self {
         let mut inputs = Self::without_latent_states(data, hypothesis, plant, known);
         if !inputs.shares_latent_states(known) {
-            inputs.latent = Arc::new(latent::<R, A, N, P>(data, &[(plant, &*inputs.torques)]).concat());
+            inputs.latent =
+                Arc::new(latent::<R, A, N, P>(data, &[(plant, inputs.torques.as_slice())]).concat());
         }
         inputs
     }
@@ -90,7 +95,7 @@ impl<const N: usize> LogInputs<N> {
             .collect();
         let own: Vec<usize> =
             (0..all.len()).filter(|&i| !all[i].shares_latent_states(hypotheses[i].2)).collect();
-        let simulated: Vec<_> = own.iter().map(|&i| (hypotheses[i].1, &*all[i].torques)).collect();
+        let simulated: Vec<_> = own.iter().map(|&i| (hypotheses[i].1, all[i].torques.as_slice())).collect();
         let latent = latent::<R, A, N, P>(data, &simulated);
         for (i, latent) in own.into_iter().zip(latent) {
             all[i].latent = Arc::new(latent);
@@ -161,7 +166,7 @@ fn torques<const N: usize, const P: usize>(
 /// logs without windows, and for plants without latent states.
 fn latent<R: Rollouts, A: Arm<f64, N, P>, const N: usize, const P: usize>(
     data: &Dataset<N>,
-    simulated: &[(&Plant<f64, A, N, P>, &Vec<Option<Torques<N>>>)],
+    simulated: &[UnderTorques<'_, A, N, P>],
 ) -> Vec<LatentStates<N>> {
     let mut all = vec![vec![None; data.tracks.len()]; simulated.len()];
     let (mut places, mut runs) = (Vec::new(), Vec::new());

@@ -67,7 +67,7 @@ impl Rollouts for SideBySide {
         let level = Level::widest();
         let Some(step_limits) = runs.first().map(|run| step_limits(run.plant)) else { return };
         runs.par_chunks_mut(GROUP).for_each(|runs| {
-            LatentRollout { runs, limit: DIVERGED, step_limits, correction: None }.run_all(level)
+            LatentRollout { runs, limit: DIVERGED, step_limits, correction: None }.run_all(level);
         });
     }
 
