@@ -283,13 +283,29 @@ fn a_run_that_leaves_the_limit_ends_alone() {
     }
 }
 
+/// Torque on a pendulum, N m, held from each sample to the next.
+fn torque(t: f64) -> f64 {
+    6.0 * (9.0 * t).sin()
+}
+
+/// Positions that the encoder shows of a pendulum that starts at 0.3 rad and 0.5 rad/s under [`torque`].
+fn swung(plant: &Plant<f64, Pendulum<f64>, 1, 4>) -> Vec<f64> {
+    let t: Vec<f64> = (0..=ROWS).map(|k| H * k as f64).collect();
+    let held: Vec<_> = t.iter().map(|t| [InputSegment::held(torque(*t))]).collect();
+    let mut positions = vec![f64::NAN; ROWS];
+    let state = State::new(Vector1::new(0.3), Vector1::new(0.5));
+    let run = Run { plant, t: &t, torque: &held[..ROWS], state, positions: &mut positions };
+    LatentRollout { runs: &mut [run], limit: 1e3, step_limits: LIMITS, correction: None }
+        .run_all(Level::widest());
+    positions
+}
+
 /// Positions that an encoder on the motor shows, of a pendulum behind an elastic shaft: the equations in the motor's own position `motor`, in place
 /// of a deflection (Siciliano 2009, section 6.1), by Runge-Kutta in steps of a hundredth of a sample.
 fn elastic_pendulum(
     [inertia, weight, viscous, coulomb]: [f64; 4],
     [stiffness, damping, rotor]: [f64; 3],
     width: f64,
-    torque: impl Fn(f64) -> f64,
 ) -> Vec<f64> {
     let rates = |t: f64, [link, motor, link_speed, motor_speed]: [f64; 4]| {
         let shaft = stiffness * (motor - link) + damping * (motor_speed - link_speed);
@@ -323,18 +339,114 @@ fn an_elastic_pendulum_obeys_the_equations_in_its_motors_position() {
         .and_then(|plant| plant.with_sides(0, Sides::MOTOR))
         .expect("a joint of the pendulum")
         .with_rounding([width]);
-    let torque = |t: f64| 6.0 * (9.0 * t).sin();
-    let t: Vec<f64> = (0..=ROWS).map(|k| H * k as f64).collect();
-    let held: Vec<_> = t.iter().map(|t| [InputSegment::held(torque(*t))]).collect();
-    let mut positions = vec![f64::NAN; ROWS];
-    let state = State::new(Vector1::new(0.3), Vector1::new(0.5));
-    let run = Run { plant: &plant, t: &t, torque: &held[..ROWS], state, positions: &mut positions };
-    LatentRollout { runs: &mut [run], limit: 1e3, step_limits: LIMITS, correction: None }
-        .run_all(Level::widest());
-    let expected = elastic_pendulum(theta, shaft, width, torque);
+    let positions = swung(&plant);
+    let expected = elastic_pendulum(theta, shaft, width);
     let most = positions.iter().zip(&expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     let travel = expected.iter().fold(0.0_f64, |most, q| most.max((q - 0.3).abs()));
     assert!(most < 1e-6 && travel > 0.3, "{most:e} of {travel}");
+}
+
+/// A pendulum behind backlash, in the motor's own position: motor and link move apart between the flanks, meet without rebound and with their momentum
+/// kept, and move as one body while the flank pushes (Nordin and Gutman 2002). Small steps of the semi-implicit Euler method; events at their ends.
+/// Returns what the encoder shows, and how often the two meet.
+fn slack_pendulum(
+    [inertia, weight, viscous, coulomb]: [f64; 4],
+    [gap, rotor]: [f64; 2],
+    width: f64,
+    at_motor: bool,
+) -> (Vec<f64>, usize) {
+    const PARTS: usize = 4000;
+    let link = inertia - rotor;
+    let friction = |speed: f64| viscous * speed + coulomb * (speed / width).tanh();
+    let h = H / PARTS as f64;
+    let ([mut q, mut motor], [mut dq, mut dmotor]): ([f64; 2], [f64; 2]) = ([0.3, 0.3], [0.5, 0.5]);
+    let (mut flank, mut shown, mut meetings) = (0.0_f64, Vec::new(), 0);
+    for k in 0..ROWS * PARTS {
+        let tau = torque(H * (k / PARTS) as f64);
+        if flank != 0.0 {
+            let together = (tau - weight * q.sin() - friction(dq)) / inertia;
+            let on_motor = if at_motor { friction(dq) } else { 0.0 };
+            if (tau - on_motor - rotor * together) * flank < 0.0 {
+                flank = 0.0;
+            } else {
+                dq += h * together;
+                dmotor = dq;
+            }
+        }
+        if flank == 0.0 {
+            let [of_link, of_motor] = if at_motor { [0.0, friction(dmotor)] } else { [friction(dq), 0.0] };
+            dq += h * (-weight * q.sin() - of_link) / link;
+            dmotor += h * (tau - of_motor) / rotor;
+        }
+        q += h * dq;
+        motor += h * dmotor;
+        let beyond = (motor - q).abs() - 0.5 * gap;
+        if flank == 0.0 && beyond > 0.0 {
+            flank = (motor - q).signum();
+            motor -= flank * beyond;
+            dq = (link * dq + rotor * dmotor) / inertia;
+            dmotor = dq;
+            meetings += 1;
+        }
+        if k % PARTS == PARTS - 1 {
+            shown.push(if at_motor { motor } else { q });
+        }
+    }
+    (shown, meetings)
+}
+
+#[test]
+fn a_pendulum_behind_backlash_obeys_the_equations_in_its_motors_position() {
+    let (theta, gap, share, width) = ([0.5, 3.0, 0.1, 0.4], 0.05, 0.2, 0.5);
+    let law = find::<f64>("backlash").expect("in the catalogue");
+    for sides in [Sides::LINK, Sides::MOTOR] {
+        let plant = Plant::new(Pendulum { gravity: 9.81 }, theta)
+            .with_effect(Active { law, joint: 0, p: [gap, share, 0.0] })
+            .and_then(|plant| plant.with_sides(0, sides))
+            .expect("a joint of the pendulum")
+            .with_rounding([width]);
+        let positions = swung(&plant);
+        let rotor = share * theta[0];
+        let (expected, meetings) = slack_pendulum(theta, [gap, rotor], width, sides == Sides::MOTOR);
+        let most = apart(&positions, &expected);
+        let travel = expected.iter().fold(0.0_f64, |most, q| most.max((q - 0.3).abs()));
+        assert!(most < 5e-6 && travel > 0.3 && meetings > 1, "{sides:?}: {most:e} of {travel}, {meetings}");
+    }
+}
+
+/// A pendulum with presliding: the friction contact's torque grows with the way, up to its amplitude (Dahl 1968), by Runge-Kutta in time.
+#[test]
+fn a_pendulum_with_presliding_obeys_the_equation_in_time() {
+    let ([inertia, weight, viscous, coulomb], [amplitude, stiffness], width): ([f64; 4], [f64; 2], f64) =
+        ([0.5, 3.0, 0.1, 0.4], [0.8, 40.0], 0.5);
+    let rates = |t: f64, [q, dq, z]: [f64; 3]| {
+        let friction = viscous * dq + coulomb * (dq / width).tanh();
+        let growth = stiffness * dq * (1.0 - dq.signum() * z / amplitude);
+        [dq, (torque(t) - weight * q.sin() - friction - z) / inertia, growth]
+    };
+    let ahead = |x: [f64; 3], k: [f64; 3], h: f64| std::array::from_fn(|i| x[i] + h * k[i]);
+    let h = H / 100.0;
+    let (mut x, mut expected): ([f64; 3], _) = ([0.3, 0.5, 0.0], Vec::new());
+    for k in 0..ROWS * 100 {
+        let t = H * (k / 100) as f64;
+        let k1 = rates(t, x);
+        let k2 = rates(t, ahead(x, k1, h / 2.0));
+        let k3 = rates(t, ahead(x, k2, h / 2.0));
+        let k4 = rates(t, ahead(x, k3, h));
+        x = std::array::from_fn(|i| x[i] + h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]));
+        if k % 100 == 99 {
+            expected.push(x[0]);
+        }
+    }
+    let law = find::<f64>("presliding").expect("in the catalogue");
+    let plant = Plant::new(Pendulum { gravity: 9.81 }, [inertia, weight, viscous, coulomb])
+        .with_effect(Active { law, joint: 0, p: [amplitude, stiffness, 0.0] })
+        .expect("a joint of the pendulum")
+        .with_rounding([width]);
+    let positions = swung(&plant);
+    let most = apart(&positions, &expected);
+    let travel = expected.iter().fold(0.0_f64, |most, q| most.max((q - 0.3).abs()));
+    assert!(most < 1e-5 && travel > 0.3, "{most:e} of {travel}");
 }
 
 #[test]

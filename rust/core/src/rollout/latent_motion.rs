@@ -1,6 +1,6 @@
-//! Accelerations of one plant with latent states or regularised friction, in several runs side by side.
+//! Accelerations of plants with latent states or regularised friction, side by side.
 //!
-//! The equations are those of [`Plant::acceleration`](crate::plant::Plant::acceleration), with one run in each lane. Factors of zero take the rotor of
+//! The equations are those of [`Plant::acceleration`](crate::plant::Plant::acceleration), with one plant in each lane. Factors of zero take the rotor of
 //! an open backlash out of the arm's inertia, and the motor torque of a closed one out of the rotor's motion.
 
 use super::latent_lanes::{LatentLaneState, LatentLanes, LatentModes};

@@ -160,10 +160,9 @@ impl<'a, A: Arm<f64, N, P>, const N: usize, const P: usize> TestPoint<'a, A, N, 
         order.sort_by_key(|i| candidates[*i].place());
         let alike: Vec<&[usize]> =
             order.chunk_by(|a, b| candidates[*a].place() == candidates[*b].place()).collect();
-        let traced = alike.par_iter().flat_map(|alike| {
+        let traced = alike.par_iter().flat_map_iter(|alike| {
             let own: Vec<EffectInstance> = alike.iter().map(|i| candidates[*i]).collect();
-            let traces = self.traces_at_one_place(&own);
-            alike.par_iter().copied().zip(traces).collect::<Vec<_>>()
+            alike.iter().copied().zip(self.traces_at_one_place(&own))
         });
         let mut traces = vec![Vec::new(); candidates.len()];
         for (i, trace) in traced.collect::<Vec<_>>() {

@@ -75,12 +75,7 @@ impl<const N: usize> LogInputs<N> {
         plant: &Plant<f64, A, N, P>,
         known: Option<&Self>,
     ) -> Self {
-        let mut inputs = Self::without_latent_states(data, hypothesis, plant, known);
-        if !inputs.shares_latent_states(known) {
-            inputs.latent =
-                Arc::new(latent::<R, A, N, P>(data, &[(plant, inputs.torques.as_slice())]).concat());
-        }
-        inputs
+        Self::of_all::<R, A, P>(data, &[(hypothesis, plant, known)]).swap_remove(0)
     }
 
     /// Inputs of the logs of `data` under hypotheses that differ in values alone, each with its simulator and the inputs known of another hypothesis, as
