@@ -46,8 +46,8 @@ ALIKE = (
     {"rotor_inertia", "payload", "joint_elasticity", "backlash"},
 )
 FAMILIES = (
-    "single", "pair", "clutter", "clutter-only", "clutter-push", "hidden-state", "null", "push", "rounding", "presliding", "parameters",
-    "outside", "disturbed",
+    "single", "pair", "clutter", "clutter-only", "clutter-push", "hidden-state", "hidden-push", "null", "push", "rounding", "presliding",
+    "parameters", "outside", "disturbed",
 )  # fmt: skip
 #: Standard deviations of the random torque in the family "disturbed", relative to the joint's RMS torque; smallest and largest correlation time [s].
 STRENGTHS = (0.02, 0.05, 0.10)
@@ -57,7 +57,7 @@ WIDTHS = (1e-3, 8e-3)
 WIDE = (1e-3, 5e-2)
 #: Smallest and largest standard deviation [rad] of a joint's encoder zero between recordings, in the families "zeros" and "zeros-null".
 ZEROS = (2e-3, 4e-2)
-#: Pushes in the families "push" and "clutter-push": largest number in a log; smallest and largest standard deviation in time [s] of their Gaussian
+#: Pushes in the families that end in "push": largest number in a log; smallest and largest standard deviation in time [s] of their Gaussian
 #: torque, and its peak in Coulomb levels of the joint; least time between two pushes, and from a push to the ends of its log [s].
 PUSHES = 3
 PUSH_WIDTHS = (0.03, 0.13)
@@ -453,6 +453,7 @@ def _draw_mains(rng: np.random.Generator, family: str) -> list[tuple[str, int | 
         "clutter": known,
         "zeros": known,
         "hidden-state": requests(HIDDEN_STATES),
+        "hidden-push": requests(HIDDEN_STATES),
         "presliding": requests(("presliding",)),
         "outside": requests(OUTSIDE),
     }.get(family, [])
