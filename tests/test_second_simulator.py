@@ -10,7 +10,8 @@ from armgap.simulation import Effect
 
 pytest.importorskip("numba")
 
-from second_simulator.cases import Machine, draw_machine, draw_pushes, draw_reference, run
+from second_simulator.cases import Machine, draw_machine, draw_pushes, run
+from second_simulator.motions import DWELLS, PEAK_SPEEDS, REACH, draw_reference, moves
 from second_simulator.scoring import PARAMETERS, intervals, is_push, laws
 
 #: Both integrators and their steps [rad]; encoders are taken out.
@@ -223,3 +224,15 @@ def test_a_law_is_right_on_its_joint_over_its_variables_and_within_its_band() ->
     assert "of 4 the joint and one or all of the variables are right in 3, all variables in 3" in text
     assert "1 of 3 within their band" in text
     assert "2 further entries; of 2 arms without an effect 1 have entries" in text
+
+
+def test_moves_keep_to_their_reach_and_speed_and_dwell_between() -> None:
+    t = 0.002 * np.arange(5000)
+    for seed in range(10):
+        q = moves(np.random.default_rng(seed), t)
+        speed = np.abs(np.gradient(q, t))
+        assert np.abs(q).max() <= REACH + 1e-12
+        assert speed.max() <= 1.001 * PEAK_SPEEDS[1]
+        dwells = np.diff(np.flatnonzero(np.diff(np.concatenate([[0], speed < 1e-9, [0]]).astype(int))))[::2] * 0.002
+        assert len(dwells) > 4
+        assert dwells[1:-1].min() > DWELLS[0] - 0.01

@@ -12,6 +12,7 @@ import numpy as np
 import polars as pl
 
 from .dynamics import STEP, simulate, table
+from .motions import draw_reference, moves, multisine
 
 Array = np.ndarray
 TURN = 2.0 * math.pi
@@ -22,6 +23,9 @@ DESIGNS = {
     "small": ((0.7, 0.6), (0.22, 0.28), (0.16, 0.21), (0.010, 0.008), (0.02, 0.012), (0.12, 0.09), (9.0, 6.0), 65536),
 }
 PERIODS = (0.001, 0.002, 0.0025, 0.004)
+#: Encoder counts per turn and sample periods [s] of the family "moves".
+COARSE = (4096, 16384, 65536)
+SLOW = (0.002, 0.004, 0.01)
 #: Relative standard deviations in the arm file: of inertial values, and of friction.
 TRUST = (0.05, 0.20)
 JOINT_EFFECTS = (
@@ -47,7 +51,7 @@ ALIKE = (
 )
 FAMILIES = (
     "single", "pair", "clutter", "clutter-only", "clutter-push", "hidden-state", "hidden-push", "null", "push", "rounding", "presliding",
-    "parameters", "outside", "disturbed",
+    "parameters", "outside", "disturbed", "moves",
 )  # fmt: skip
 #: Standard deviations of the random torque in the family "disturbed", relative to the joint's RMS torque; smallest and largest correlation time [s].
 STRENGTHS = (0.02, 0.05, 0.10)
@@ -118,33 +122,6 @@ def draw_machine(rng: np.random.Generator) -> Machine:
     step = np.full(2, TURN / counts)
     arm = np.array([m1, m2, l1, c1, c2, i1, i2, 9.81])
     return Machine(design, arm, joints, np.array(limit), step, float(rng.choice(PERIODS)))
-
-
-def draw_reference(rng: np.random.Generator, machine: Machine, duration: float) -> Array:
-    """Return a multisine reference with gains of a PD controller, with gravity as feed-forward or none, shape (n_samples, 2, 6)."""
-    n = round(duration / machine.period)
-    t = machine.period * np.arange(n)
-    out = np.zeros((n, 2, 6))
-    fade = 0.5 * (1 - np.cos(np.pi * np.minimum(t / 0.8, 1.0)))
-    bandwidth = rng.uniform(8.0, 16.0)
-    for j in range(2):
-        k = int(rng.integers(3, 7))
-        f = np.exp(rng.uniform(math.log(0.15), math.log(1.6), k))
-        size = rng.uniform(0.3, 1.0, k) / np.sqrt(f)
-        size *= rng.uniform(0.5, 1.1) / np.sqrt(np.sum(size**2) / 2)
-        phase = rng.uniform(0, TURN, k)
-        wave = size[:, None] * np.sin(TURN * f[:, None] * t + phase[:, None])
-        q = fade * (rng.uniform(-0.4, 0.4) + wave.sum(0)) * 0.8
-        out[:, j, 0] = q
-        out[:, j, 1] = np.gradient(q, machine.period)
-        out[:, j, 3] = machine.inertia[j] * bandwidth**2
-        out[:, j, 4] = 1.4 * machine.inertia[j] * bandwidth
-        out[:, j, 5] = machine.limit[j]
-    if rng.uniform() < 0.5:
-        theta = machine.theta
-        out[:, 1, 2] = theta[4] * np.sin(out[:, 0, 0] + out[:, 1, 0])
-        out[:, 0, 2] = theta[3] * np.sin(out[:, 0, 0]) + out[:, 1, 2]
-    return out
 
 
 @dataclass(frozen=True)
@@ -371,11 +348,14 @@ def _make(rng: np.random.Generator, family: str, folder: Path, duration: float) 
     if family == "rounding":
         for p in machine.joints:
             p["width"], p["algebraic"] = _log_uniform(rng, WIDE), float(rng.uniform() < 0.5)
+    if family == "moves":
+        machine.step, machine.period = np.full(2, TURN / float(rng.choice(COARSE))), float(rng.choice(SLOW))
     cluttered = family.startswith("clutter")
     with_zeros = family.startswith("zeros")
     training = 3 if with_zeros else 2 if cluttered else 1
     names = [*(f"train-{i + 1}" for i in range(training)), "holdout-1"]
-    references = [draw_reference(rng, machine, duration) for _ in names]
+    path = moves if family == "moves" else multisine
+    references = [draw_reference(rng, machine, duration, path) for _ in names]
     seeds = [int(s) for s in rng.integers(0, 2**31, len(names))]
     nothing = np.zeros(2)
     plain = [run(machine, r, s, nothing) for r, s in zip(references, seeds, strict=True)]
@@ -452,6 +432,7 @@ def _draw_mains(rng: np.random.Generator, family: str) -> list[tuple[str, int | 
         "pair": known,
         "clutter": known,
         "zeros": known,
+        "moves": known + requests(HIDDEN_STATES),
         "hidden-state": requests(HIDDEN_STATES),
         "hidden-push": requests(HIDDEN_STATES),
         "presliding": requests(("presliding",)),
