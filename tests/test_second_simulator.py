@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from armgap import Arm, simulate
+from armgap import Arm, Log, diagnose, simulate
 from armgap.simulation import Effect
 
 pytest.importorskip("numba")
@@ -166,6 +166,22 @@ def test_a_push_moves_its_joint_and_is_scored_by_log_joint_time_and_sign(machine
     assert is_push(named(), push)
     for other in ({"joint": 1}, {"time": 1.3}, {"impulse": 0.3}, {"log": "train-2"}):
         assert not is_push(named(**other), push)
+
+
+def test_a_gaussian_push_is_a_bell_of_its_impulse(machine: Machine) -> None:
+    pushed = Machine(**{**vars(machine), "step": np.full(2, 2e-5)})
+    impulse, time, width = -1.2, 2.0, 0.06
+    row = np.array([[1.0, time, width, impulse]])
+    references = [draw_reference(np.random.default_rng(seed), machine, 5.0) for seed in (3, 4)]
+    made = [run(pushed, r, 0, np.zeros(2), rows) for r, rows in zip(references, (None, row), strict=True)]
+    logs = [Log(name, r.t, r.q, r.tau, None) for name, r in zip(("train", "pushed"), made, strict=True)]
+    found = diagnose(logs[:1], arm_of(machine), holdout=logs[1:])
+    (cause,) = found.causes
+    assert (cause.effect, cause.joint, cause.log, cause.shape) == ("external_pulse", 2, "pushed", "bell")
+    size = cause.parameters["impulse"]
+    assert size.value == pytest.approx(impulse, rel=0.08)
+    assert abs(size.value - impulse) < 4.0 * size.sigma
+    assert cause.parameters["duration"].value == pytest.approx(np.sqrt(12.0) * width, rel=0.1)
 
 
 def test_pushes_are_above_friction_and_apart(machine: Machine) -> None:

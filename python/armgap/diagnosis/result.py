@@ -174,7 +174,8 @@ class Cause:
     """A named cause, or a candidate with the reason `why` it is not named; an external disturbance belongs to one log.
 
     An elastic or slack transmission has `sides`: ``encoder`` and ``friction`` at the ``"motor"`` or the ``"link"``, and ``rotor``, which
-    ``"rides"`` on the preceding joints or is ``"geared"``.
+    ``"rides"`` on the preceding joints or is ``"geared"``. An external push has a `shape` over time: ``"rectangle"``, or ``"bell"``, a raised cosine
+    with the variance of a rectangle of its duration.
 
     A common law on several `joints` is one cause: `joint` is None, `parameters` are empty, and `values` has one entry per joint
     (`by_joint` splits it into causes of single joints). A term that acts on a sum or a difference of two joints' motion has the factors of
@@ -194,6 +195,7 @@ class Cause:
     joints: tuple[int, ...] | None = None
     row: tuple[int, int] | None = None
     values: dict[str, Values] = field(default_factory=dict)
+    shape: str | None = None
 
     def by_joint(self) -> tuple[Cause, ...]:
         """Return the cause itself, or one cause per joint where a common law acts on several joints."""
@@ -435,6 +437,7 @@ def _cause(data: dict[str, Any]) -> Cause:
         data.get("why"),
         data.get("sides"),
         values=values,
+        shape=data.get("shape"),
         **_several(data),
     )
 

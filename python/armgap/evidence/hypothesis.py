@@ -49,6 +49,11 @@ def at_motor(sides: dict[str, str] | None) -> dict[str, float]:
     return {**found, "rotor_rides": float(sides["rotor"] == "rides")}
 
 
+def bell(shape: str | None) -> dict[str, float]:
+    """Return the `shape` of an external push as a number, 1 for a bell and 0 for a rectangle; nothing for other causes."""
+    return {} if shape is None else {"bell": float(shape == "bell")}
+
+
 @dataclass(frozen=True)
 class Hypothesis:
     """A model of an arm: base parameters, effects and smoothed friction.
@@ -79,7 +84,7 @@ class Hypothesis:
             EffectInstance(
                 c["effect"],
                 c["joint"],
-                {**{name: p["value"] for name, p in c["parameters"].items()}, **at_motor(c.get("sides"))},
+                {name: p["value"] for name, p in c["parameters"].items()} | at_motor(c.get("sides")) | bell(c.get("shape")),
                 c.get("log"),
             )
             for c in data.get("causes") or []

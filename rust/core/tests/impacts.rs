@@ -1,10 +1,11 @@
 //! Tests of events between samples: backlash that closes and opens, impacts on joint limits, disturbances that begin and end.
 
 use armgap_core::arm::{Axis, TwoLink};
-use armgap_core::effect::{Active, Effect, InputSegment, MAX_PARAMETERS, find};
+use armgap_core::effect::{Active, Effect, InputSegment, MAX_PARAMETERS, PulseShape, find};
 use armgap_core::integrate::{Interval, State, advance};
 use armgap_core::plant::Plant;
 use nalgebra::{SVector, Vector1, Vector2};
+use std::f64::consts::PI;
 
 const THETA: [f64; 9] = [2.3516, 0.0838, 0.1019, 38.465, 1.827, 2.288, 0.175, 7.6, 1.734];
 const H: f64 = 0.0025;
@@ -140,14 +141,33 @@ fn a_stop_is_as_exact_in_long_steps_as_in_short_ones() {
 fn a_push_between_samples_moves_a_mass_as_far_as_it_should() {
     let (mass, impulse, duration, centre) = (2.0, 0.8, 0.0031, 0.0137);
     let t: Vec<f64> = (0..20).map(|k| f64::from(k) * H).collect();
-    let mut torque = vec![InputSegment::held(0.0); t.len()];
-    law("external_pulse").command(&[impulse, centre, duration], &t, &mut torque);
     let plant = axis(mass);
-    let mut state = State::new(SVector::zeros(), SVector::zeros());
-    for (&t, segment) in t.iter().zip(&torque) {
-        advance(&plant, &mut state, &Interval { t, h: H, torque: &[*segment] }, 1);
+    for shape in PulseShape::ALL {
+        let mut torque = vec![InputSegment::held(0.0); t.len()];
+        shape.law().command(&[impulse, centre, duration], &t, &mut torque);
+        let mut state = State::new(SVector::zeros(), SVector::zeros());
+        for (&t, segment) in t.iter().zip(&torque) {
+            advance(&plant, &mut state, &Interval { t, h: H, torque: &[*segment] }, 1);
+        }
+        let end = 20.0 * H;
+        assert!((state.dq[0] - impulse / mass).abs() < 1e-13, "{shape:?}");
+        assert!((state.q[0] - impulse / mass * (end - centre)).abs() < 1e-13, "{shape:?}: {}", state.q[0]);
     }
-    let end = 20.0 * H;
-    assert!((state.dq[0] - impulse / mass).abs() < 1e-13);
-    assert!((state.q[0] - impulse / mass * (end - centre)).abs() < 1e-13, "{}", state.q[0]);
+}
+
+/// Mean torques over samples of 1 ms against sums of the raised cosine `impulse / (2 l) (1 + cos(pi x / l))` in steps of a microsecond, with the half
+/// period `l` from the variance of both shapes, `duration^2 / 12 = l^2 (1/3 - 2/pi^2)`.
+#[test]
+fn a_bell_is_a_raised_cosine_with_the_variance_of_the_rectangle() {
+    let (impulse, duration, centre) = (0.3, 0.05, 0.0604);
+    let l = duration / (12.0 * (1.0 / 3.0 - 2.0 / PI.powi(2))).sqrt();
+    let step = 1e-3;
+    let t: Vec<f64> = (0..120).map(|k| f64::from(k) * step).collect();
+    let mut torque = vec![InputSegment::held(0.0); t.len()];
+    PulseShape::Bell.law().command(&[impulse, centre, duration], &t, &mut torque);
+    let at = |x: f64| if x.abs() < l { 0.5 * impulse / l * (1.0 + (PI * x / l).cos()) } else { 0.0 };
+    for (t, segment) in t.iter().zip(&torque) {
+        let mean: f64 = (0..1000).map(|i| at(t + (f64::from(i) + 0.5) * 1e-6 - centre)).sum::<f64>() * 1e-3;
+        assert!((segment.mean() - mean).abs() < 1e-6, "{t}: {} {mean}", segment.mean());
+    }
 }

@@ -2,7 +2,7 @@
 
 use armgap_core::arm::{ArmKind, LinkParameters, TwoLink};
 use armgap_core::chain::{ChainJoint, JointKind};
-use armgap_core::effect::{Scope, catalogue, find};
+use armgap_core::effect::{PulseShape, Scope, catalogue, find};
 use armgap_core::transmission::Sides;
 use armgap_fit::model::arm::ArmDescription;
 use armgap_fit::model::chain::ChainDescription;
@@ -16,6 +16,8 @@ use pyo3::types::{PyDict, PyList};
 use std::collections::BTreeMap;
 
 /// Key in the values of an effect with a transmission: 1 where the encoder is at the motor, 0 where it is at the link.
+/// Key of an external push that tells whether its torque is bell-shaped, in place of constant.
+const BELL: &str = "bell";
 const ENCODER_SIDE: &str = "encoder_at_motor";
 
 /// Key in the values of an effect with a transmission: 1 where friction acts on the motor, 0 where it acts on the link.
@@ -145,6 +147,8 @@ pub fn effect_instances(
                 }
             };
             let mut values = values;
+            let is_bell = law.pulse_shape().is_some() && values.remove(BELL).is_some_and(|x| x != 0.0);
+            let law = if is_bell { PulseShape::Bell.law() } else { law };
             let mut at_motor =
                 |name: &str| law.has_transmission() && values.remove(name).is_some_and(|x| x != 0.0);
             let (encoder_at_motor, friction_at_motor, rotor_rides) =

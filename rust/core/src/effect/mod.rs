@@ -39,6 +39,7 @@ mod viscous_asymmetry;
 mod input_segment;
 mod parameter;
 
+pub use external_pulse::PulseShape;
 pub use input_segment::{InputSegment, interval};
 pub use parameter::{EffectParameter, NEVER, Quantity};
 
@@ -80,7 +81,7 @@ pub fn catalogue<T: Real>() -> &'static [&'static dyn Effect<T>] {
         &encoder_offset::EncoderOffset,
         &encoder_eccentricity::EncoderEccentricity,
         &contact::Contact,
-        &external_pulse::ExternalPulse,
+        &external_pulse::ExternalPulse { shape: PulseShape::Rectangle },
     ]
 }
 
@@ -325,6 +326,11 @@ pub trait Effect<T: Real>: Sync {
 
     /// Rewrites the command of one joint over a whole log, with sample times `t`, s, into the torque that reaches the joint, N m (N).
     fn command(&self, _p: &[T; MAX_PARAMETERS], _t: &[T], _torque: &mut [InputSegment<T>]) {}
+
+    /// Course of the torque over time, for an external disturbance.
+    fn pulse_shape(&self) -> Option<PulseShape> {
+        None
+    }
 
     /// Position that the encoder shows when the joint stands at `q`, rad or m.
     fn measured(&self, _p: &[T; MAX_PARAMETERS], q: T) -> T {

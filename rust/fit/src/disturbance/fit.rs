@@ -10,6 +10,7 @@ use crate::likelihood::weighting::Weighting;
 use crate::model::hypothesis::{EffectInstance, Hypothesis};
 use crate::predict::window::Dataset;
 use armgap_core::arm::Arm;
+use armgap_core::effect::{Effect, PulseShape};
 use armgap_core::transmission::LatentState;
 use nalgebra::{DMatrix, DVector, Vector3};
 
@@ -137,7 +138,9 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         }
         let seen = touched.cost(&touched.residual_of(&p));
         // Where the model leaves errors unexplained, a search from other durations would fit these errors instead of the push.
-        let (mut fitted, left) = if state.remainder { touched.minimise(p) } else { touched.least(p) };
+        let (law, mut fitted, left) = touched
+            .of_all_shapes(|touched| if state.remainder { touched.minimise(p) } else { touched.least(p) });
+        touched.push.law = law;
         let share = |left: f64| (bare - left) / (bare - usual.min(0.5 * bare)).max(1e-300);
         let believed = share(left) > PUSH_EXPLAINED_SHARE && bare - left > least;
         if believed && close(&fitted, &p, state.remainder) {
@@ -146,7 +149,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
                 touched.weighting = self.weighting(&touched.sample, state.model, state.scale, state.zeros);
                 (fitted, _) = touched.minimise(fitted);
             }
-            let push = EffectInstance { p: fitted.into(), ..rough.push };
+            let push = EffectInstance { p: fitted.into(), ..touched.push };
             let share = share(left);
             let largest = self.impact_impulse(rough.place(), state.model);
             let sigma = if fitted[0].abs() < OF_AN_IMPACT * largest {
@@ -181,6 +184,12 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
 /// Least decrease of the windows' cost by a push that is large enough to matter.
 fn least_gain<const N: usize, const P: usize>(sample: &WindowSet<N>, state: &PushState<'_, N, P>) -> f64 {
     state.min_relevance.powi(2) * sample.motion(&state.scale)
+}
+
+/// Variance of a whitened residual of `samples` values in `windows` windows, with the sum of squares `cost`, as that of independent values of equal
+/// information: what exceeds white noise, as a push of another course over time leaves it, has one value per window and joint.
+fn noise(cost: f64, samples: usize, windows: usize) -> f64 {
+    1.0 + (cost - samples as f64).max(0.0) / windows.max(1) as f64
 }
 
 /// Largest momentum of a rotor against its link, N m s (N s), in the first log of `data` under a model.
@@ -241,6 +250,22 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Touched<'_, A, N, P> {
         self.weighting.total(&self.weighting.costs(&self.sample.data, r))
     }
 
+    /// Shape of the push whose fit by `minimise` has the lowest cost, with impulse, time and duration, and that cost.
+    fn of_all_shapes(
+        &mut self,
+        minimise: impl Fn(&Self) -> (Vector3<f64>, f64),
+    ) -> (&'static dyn Effect<f64>, Vector3<f64>, f64) {
+        let rough = self.push.law;
+        let fits = PulseShape::ALL.map(|shape| {
+            self.push.law = shape.law();
+            let (fitted, left) = minimise(self);
+            (self.push.law, fitted, left)
+        });
+        self.push.law = rough;
+        let [first, second] = fits;
+        if second.2 < first.2 { second } else { first }
+    }
+
     /// Lowest of the minima reached from the first guess `p` and from longer pushes at the same time: impulse, time and duration, and cost.
     fn least(&self, p: Vector3<f64>) -> (Vector3<f64>, f64) {
         LONGER.iter().fold(self.minimise(p), |best, duration| {
@@ -276,10 +301,27 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Touched<'_, A, N, P> {
         (p, cost)
     }
 
-    /// Standard deviations of a push's impulse, time and duration, for noise as large as the residual and a model known up to `covariance`.
-    fn sigma(&self, p: &Vector3<f64>, covariance: &DMatrix<f64>) -> Option<[f64; 3]> {
+    /// What is not known of a push's impulse, time and duration because its course over time is not: what another shape changes, as far as that shape's
+    /// residual stays with the push as fitted (by the ratio of both residuals' norms).
+    fn doubt_of_shape(&mut self, p: &Vector3<f64>) -> Vector3<f64> {
+        let law = self.push.law;
+        let left = self.cost(&self.residual_of(p));
+        let mut doubt = Vector3::zeros();
+        for shape in PulseShape::ALL.into_iter().filter(|shape| Some(*shape) != law.pulse_shape()) {
+            self.push.law = shape.law();
+            let (other, its) = self.minimise(*p);
+            doubt = doubt.sup(&((other - p).abs() * (left / its).min(1.0).sqrt()));
+        }
+        self.push.law = law;
+        doubt
+    }
+
+    /// Standard deviations of a push's impulse, time and duration, for a variance of the residual by [`noise`], a model known up to `covariance`, and a
+    /// course over time that is known up to [`Self::doubt_of_shape`].
+    fn sigma(&mut self, p: &Vector3<f64>, covariance: &DMatrix<f64>) -> Option<[f64; 3]> {
+        let of_shape = self.doubt_of_shape(p);
         let r = self.residual_of(p);
-        let noise = (self.cost(&r) / (self.sample.data.rows * N) as f64).max(1.0);
+        let noise = noise(self.cost(&r), self.sample.data.rows * N, self.sample.data.windows.len() * N);
         let doubts = self.doubts(p, &r, covariance);
         let own = self.jacobian(p, &r);
         let columns: Vec<&[f64]> = own.iter().chain(&doubts).map(Vec::as_slice).collect();
@@ -290,7 +332,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Touched<'_, A, N, P> {
             normal[(i, i)] += 1.0;
         }
         let inverse = scaled_inverse(&normal)?;
-        Some(std::array::from_fn(|i| inverse[(i, i)].sqrt()))
+        Some(std::array::from_fn(|i| inverse[(i, i)].sqrt().hypot(of_shape[i])))
     }
 
     /// Whitened changes of the predictions along the principal axes of the model's covariance, each by one standard deviation.
@@ -355,6 +397,12 @@ mod tests {
     use crate::log::track::Track;
     use armgap_core::arm::Pendulum;
     use armgap_core::effect::find;
+
+    #[test]
+    fn what_exceeds_white_noise_counts_once_per_window() {
+        assert_eq!(noise(350.0, 400, 4), 1.0);
+        assert_eq!(noise(480.0, 400, 4), 21.0);
+    }
 
     /// Rotor behind backlash beside a link that is held: after a reversal of the torque it crosses the whole gap under this torque alone.
     #[test]

@@ -349,7 +349,7 @@ mod tests {
         {
             assert!((beside_remainder(alone, belief) - expected).abs() < 1e-12, "{alone} {belief}");
         }
-        let clear = beside_remainder(0.99, 0.5);
-        assert!(clear > 0.85 && clear < 0.99, "{clear}");
+        let alone = 1.0 - 0.5 * UNCLEAR;
+        assert!((beside_remainder(alone, 0.5) - 0.75 * alone).abs() < 1e-12, "half of the doubt");
     }
 }

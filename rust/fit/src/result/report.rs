@@ -254,6 +254,9 @@ pub struct Cause {
     /// Name of the log in which an external disturbance happened.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub log: Option<String>,
+    /// Course of an external disturbance over time: `rectangle`, or `bell`, a raised cosine with the variance over time of a rectangle of its duration.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shape: Option<&'static str>,
 }
 
 /// Sides of a transmission, `motor` or `link`, on which encoder and friction are.

@@ -113,6 +113,7 @@ pub(in crate::serial) fn cause(
         evidence: None,
         sides: None,
         log: None,
+        shape: None,
     };
     let behind = controller.map(|controller| behind_controller(&cause, controller));
     cause.equivalents.extend(behind.into_iter().flatten());

@@ -101,6 +101,7 @@ mod tests {
             evidence: None,
             sides: None,
             log: None,
+            shape: None,
         };
         let found = behind_controller(&cause, &controller);
         assert!(found.iter().all(|e| e.joint == Some(2)));
