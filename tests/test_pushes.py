@@ -69,10 +69,11 @@ def test_pushes_are_found_on_their_joint_at_their_time(pushed: list[Diagnosis]) 
             assert push.parameters["impulse"].value == pytest.approx(heights[push.joint], rel=0.35)
 
 
-def test_a_push_beside_a_remainder_is_doubtful_and_belongs_to_its_log(pushed: list[Diagnosis]) -> None:
+def test_a_push_beside_a_remainder_keeps_some_doubt_and_belongs_to_its_log(pushed: list[Diagnosis]) -> None:
+    """The gap that stays casts its doubt on every push, less on one far above the other pulses of its log."""
     for cause in (cause for found in pushed for cause in found.candidates):
         assert cause.log == "log"
-        assert 0.4 < cause.probability < 0.6
+        assert 0.4 < cause.probability < 0.95
 
 
 def test_the_same_motion_without_pushes_shows_none() -> None:
