@@ -84,7 +84,9 @@ class Hypothesis:
             EffectInstance(
                 c["effect"],
                 c["joint"],
-                {name: p["value"] for name, p in c["parameters"].items()} | at_motor(c.get("sides")) | bell(c.get("shape")),
+                {name: p["value"] for name, p in c["parameters"].items()}
+                | at_motor(c.get("sides"))
+                | bell(c.get("shape")),
                 c.get("log"),
             )
             for c in data.get("causes") or []
