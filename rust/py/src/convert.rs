@@ -15,9 +15,10 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use std::collections::BTreeMap;
 
-/// Key in the values of an effect with a transmission: 1 where the encoder is at the motor, 0 where it is at the link.
-/// Key of an external push that tells whether its torque is bell-shaped, in place of constant.
+/// Key in the values of an external push: 1 where its torque is bell-shaped, 0 where it is constant.
 const BELL: &str = "bell";
+
+/// Key in the values of an effect with a transmission: 1 where the encoder is at the motor, 0 where it is at the link.
 const ENCODER_SIDE: &str = "encoder_at_motor";
 
 /// Key in the values of an effect with a transmission: 1 where friction acts on the motor, 0 where it acts on the link.

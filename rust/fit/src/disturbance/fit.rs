@@ -140,10 +140,10 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         // Where the model leaves errors unexplained, a search from other durations would fit these errors instead of the push.
         let (law, mut fitted, left) = touched
             .of_all_shapes(|touched| if state.remainder { touched.minimise(p) } else { touched.least(p) });
-        touched.push.law = law;
         let share = |left: f64| (bare - left) / (bare - usual.min(0.5 * bare)).max(1e-300);
         let believed = share(left) > PUSH_EXPLAINED_SHARE && bare - left > least;
         if believed && close(&fitted, &p, state.remainder) {
+            touched.push.law = law;
             for _ in 0..PUSH_ROUNDS {
                 touched.sample.data.tracks[0].pushes = touched.with(&fitted);
                 touched.weighting = self.weighting(&touched.sample, state.model, state.scale, state.zeros);
@@ -170,6 +170,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         if !state.remainder {
             return None;
         }
+        touched.push.law = rough.push.law;
         if share(seen) > HELPS {
             return Some(Disturbance { share: share(seen), ..rough });
         }
