@@ -93,7 +93,8 @@ fn hidden_in_training<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     if !found.causes.is_empty() || found.is_unexplained() {
         return false;
     }
-    let (bare, zeros) = (context.training.data.without_pushes(), &last.weights.training.zeros);
+    let WindowSet { data, measured } = context.all_windows(&context.training);
+    let (bare, zeros) = (WindowSet { data: data.without_pushes(), measured }, &last.weights.training.zeros);
     training_gap(context, &bare, &found.model.hypothesis, zeros, seed).is_some()
 }
 
@@ -107,7 +108,7 @@ fn left_in_training<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         return None;
     }
     let zeros = &headline.weights.training.zeros;
-    training_gap(context, &context.training.data, &headline.model.hypothesis, zeros, seed)
+    training_gap(context, &context.training, &headline.model.hypothesis, zeros, seed)
 }
 
 impl Request<'_> {

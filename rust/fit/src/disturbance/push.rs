@@ -8,7 +8,7 @@ use super::bell::Bell;
 use super::own::Own;
 use super::residual::Residual;
 use super::search::{MAX_PUSHES, search};
-use crate::likelihood::context::DiagnosisContext;
+use crate::likelihood::context::{DiagnosisContext, WindowSet};
 use crate::likelihood::encoder_zero::EncoderZeros;
 use crate::log::track::Track;
 use crate::model::hypothesis::{EffectInstance, Hypothesis};
@@ -38,9 +38,6 @@ const REMAINDER_DOUBT: f64 = 0.5;
 /// gave, on 90 simulated arms with effects outside the library, one was at 0.027 and all others above 0.05; of 14 that were given and stand beside such a
 /// gap, one was at 0.028 and all others at 0.006 or less (docs/decisions/021-pushes-beside-a-remainder.md).
 const UNCLEAR: f64 = 0.02;
-
-/// Ratio of the final RMS prediction errors on the holdout, with the pushes over without them, above which the pushes are rejected.
-const MUCH_WORSE: f64 = 1.5;
 
 /// Least impulse of a push, in standard deviations of the impulse, for it to differ significantly from zero.
 const SIGNIFICANT_IMPULSE: f64 = 2.0;
@@ -110,13 +107,12 @@ pub(super) struct PushState<'a, const N: usize, const P: usize> {
 pub(super) type Place = (usize, usize);
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// Conclusion of a diagnosis from the attribution `alone`, made without pushes: the pushes that it leaves unexplained, and the attribution
-    /// repeated with these pushes in their logs.
+    /// Conclusion of a diagnosis from the attribution `alone`, made without pushes: the attribution repeated without the windows in which the pushes act
+    /// that `alone` leaves unexplained, and the pushes that the repeated one leaves; where that leaves errors unexplained too, the pushes that `alone` leaves,
+    /// as neither model tells them better.
     ///
-    /// Where the model describes the arm, pushes are looked for again under the model fitted together with the first ones. Where the model leaves
-    /// errors unexplained, the first pushes are kept, as the second model has taken up part of the pushes. Pushes are rejected if prediction errors
-    /// with pushes are much larger than without. An effect that replaces some pushes, or torques too light for pushes, stays in the model together with
-    /// the remaining pushes.
+    /// The windows of the second attribution stay those of the context, where it is part of the conclusion. An effect that replaces some pushes, or
+    /// torques too light for pushes, stays in the model together with the remaining pushes.
     pub fn conclude(
         &mut self,
         mut alone: Attribution<N, P>,
@@ -135,19 +131,18 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             return Conclusion::without(alone);
         }
         self.set_pushes(&disturbances);
-        let mut beside = self.attribute(max_causes, seed, law);
-        let harmful = beside.error() > MUCH_WORSE * alone.error();
-        if harmful {
-            disturbances.clear();
-        } else if !alone.is_unexplained() {
+        self.leave_out_pushes();
+        let beside = self.attribute(max_causes, seed, law);
+        let clear = self.take_all_windows();
+        if !beside.is_unexplained() {
             disturbances = self.pushes(&beside, faint);
         }
         self.set_pushes(&disturbances);
         if disturbances.is_empty() {
             return Conclusion::without(alone);
         }
-        // These fits were made beside the first pushes.
-        beside.without.clear();
+        [self.training, self.holdout] = clear;
+        self.set_pushes(&disturbances);
         // A push is less probable where the gap that it was to explain remains, not where the arm lacks effects besides.
         let belief = belief_beside(left_beside(&alone.nodes, &beside.nodes), REMAINDER_DOUBT);
         for disturbance in &mut disturbances {
@@ -291,6 +286,19 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
 
     pub(super) fn track(&self, (set, index): Place) -> &Track<N> {
         &[&self.training, &self.holdout][set].data.tracks[index]
+    }
+
+    /// Leaves out the windows of training logs and holdout in which the known pushes act.
+    fn leave_out_pushes(&mut self) {
+        for sample in [&mut self.training, &mut self.holdout] {
+            *sample = WindowSet::new(sample.data.clone().clear_of_pushes());
+        }
+    }
+
+    /// Takes all windows of training logs and holdout again; returns the windows that were taken before.
+    pub fn take_all_windows(&mut self) -> [WindowSet<N>; 2] {
+        let [training, holdout] = [&self.training, &self.holdout].map(|sample| self.all_windows(sample));
+        [std::mem::replace(&mut self.training, training), std::mem::replace(&mut self.holdout, holdout)]
     }
 
     /// Replaces the known pushes of all logs by `disturbances`.

@@ -136,6 +136,11 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         }
     }
 
+    /// All windows of the logs of `sample`, those in which pushes act too.
+    pub(crate) fn all_windows(&self, sample: &WindowSet<N>) -> WindowSet<N> {
+        WindowSet::new(Dataset::new(sample.data.tracks.clone(), self.horizon))
+    }
+
     /// Fitting problem on the training windows with the weighting `weighting`.
     pub fn problem<'a>(&'a self, weighting: &'a Weighting<N>) -> FitProblem<'a, A, N, P> {
         self.on(&self.training, weighting)
@@ -146,7 +151,11 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         self.on(&self.holdout, weighting)
     }
 
-    fn on<'a>(&'a self, sample: &'a WindowSet<N>, weighting: &'a Weighting<N>) -> FitProblem<'a, A, N, P> {
+    pub(crate) fn on<'a>(
+        &'a self,
+        sample: &'a WindowSet<N>,
+        weighting: &'a Weighting<N>,
+    ) -> FitProblem<'a, A, N, P> {
         FitProblem {
             arm: &self.arm,
             data: &sample.data,

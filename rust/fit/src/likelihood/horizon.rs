@@ -59,7 +59,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         weights: &SplitWeighting<N>,
     ) -> Option<HorizonBias<P>> {
         let horizon = SHORTER * self.horizon;
-        let data = Dataset::new(self.training.data.tracks.clone(), horizon);
+        let data = Dataset::new(self.training.data.tracks.clone(), horizon).clear_of_pushes();
         if (data.windows.len() as f64) < ENOUGH_MORE * self.training.data.windows.len() as f64 {
             return None;
         }

@@ -4,8 +4,9 @@
 //! flat vector, row by row and joint by joint.
 
 use crate::log::cut::cut_at_smooth_motion;
+use crate::log::input::FEWEST_WINDOWS;
 use crate::log::track::{InitialState, Track};
-use crate::model::hypothesis::Hypothesis;
+use crate::model::hypothesis::{EffectInstance, Hypothesis};
 use crate::predict::log_inputs::LogInputs;
 use crate::predict::rollouts::{DIVERGED, Rollouts, SideBySide, Singly};
 use armgap_core::arm::Arm;
@@ -24,6 +25,12 @@ const FEWEST_WINDOW_BLOCKS: usize = 8;
 
 /// Largest length of a block relative to `BLOCK`, as windows end where the state is measured best.
 const BLOCK_SLACK: f64 = 1.1;
+
+/// Half the time around a push, in its durations, in which it may act: half the period of the longest shape.
+const PUSH_REACH: f64 = 0.8;
+
+/// Least share of the windows that must be clear of pushes for the others to be left out.
+const LEAST_CLEAR: f64 = 0.5;
 
 /// Window of a log: samples `first ..= last` of one track, with predictions from sample `first + 1` (row 0) on.
 #[derive(Debug, Clone, Copy)]
@@ -69,6 +76,33 @@ impl<const N: usize> Dataset<N> {
         let mut bare = self.clone();
         bare.tracks.iter_mut().for_each(|track| track.pushes.clear());
         bare
+    }
+
+    /// The dataset with only those windows in which no known external disturbance of their logs acts; all windows where too few are clear.
+    ///
+    /// A push is an unknown input, whose course is known by what the model leaves unexplained in these windows alone: what remains there says little of
+    /// the arm.
+    pub fn clear_of_pushes(self) -> Self {
+        let (mut windows, mut rows) = (Vec::new(), 0);
+        for window in self.windows.iter().filter(|w| !self.is_pushed(w)) {
+            windows.push(Window { offset: rows, ..*window });
+            rows += window.rows();
+        }
+        if windows.len() < FEWEST_WINDOWS.max((LEAST_CLEAR * self.windows.len() as f64) as usize) {
+            return self;
+        }
+        Self { tracks: self.tracks, windows, rows }
+    }
+
+    /// Whether a known external disturbance may act in a window.
+    fn is_pushed(&self, window: &Window<N>) -> bool {
+        let track = &self.tracks[window.track];
+        let acts = |push: &EffectInstance| {
+            let [_, time, duration] = push.p;
+            let reach = PUSH_REACH * duration;
+            time - reach < track.t[window.last] && time + reach > track.t[window.first]
+        };
+        track.pushes.iter().any(acts)
     }
 
     /// Indices of the windows in blocks: consecutive windows of one track over about `BLOCK` seconds; each window alone where there would be fewer than
@@ -331,6 +365,39 @@ pub(crate) fn enter<A: Arm<f64, N, P>, const N: usize, const P: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn windows_in_which_pushes_act_are_left_out_unless_they_are_most() {
+        let t: Vec<f64> = (0..800).map(|k| 0.01 * f64::from(k)).collect();
+        let q: Vec<f64> = t.iter().map(|t| t.sin()).collect();
+        let track = Track::<1>::new("", &t, &q, &vec![0.0; t.len()], Some([1e-5]));
+        let law = armgap_core::effect::find::<f64>("external_pulse").expect("known");
+        let beside = |pushes: &[[f64; 3]]| {
+            let mut data = Dataset::new(vec![track.clone(), track.clone()], 0.25);
+            data.tracks[1].pushes = pushes.iter().map(|p| EffectInstance::new(law, 0, *p)).collect();
+            let clear = data.clone().clear_of_pushes();
+            (data, clear)
+        };
+        let (all, clear) = beside(&[[1.0, 3.0, 0.1], [-0.5, 6.0, 0.2]]);
+        for (window, kept) in all
+            .windows
+            .iter()
+            .map(|w| (w, clear.windows.iter().find(|c| c.track == w.track && c.first == w.first)))
+        {
+            let [from, to] = [window.first, window.last].map(|k| t[k]);
+            let acts = [(3.0, 0.1), (6.0, 0.2)]
+                .iter()
+                .any(|(at, long)| from < at + 0.8 * long && to > at - 0.8 * long);
+            assert_eq!(kept.is_none(), window.track == 1 && acts, "{from} to {to} s of log {}", window.track);
+        }
+        assert_eq!(clear.measured().len(), clear.rows);
+        assert!(clear.windows.iter().zip(&clear.windows[1..]).all(|(a, b)| b.offset == a.offset + a.rows()));
+        let (all, same) = beside(&[[1.0, 4.0, 10.0]]);
+        assert!(same.windows.len() == all.windows.len() / 2, "half of the windows are clear");
+        let mut most = all;
+        most.tracks[0].pushes = vec![EffectInstance::new(law, 0, [1.0, 4.0, 1.0])];
+        assert_eq!(most.clone().clear_of_pushes().windows.len(), most.windows.len());
+    }
 
     #[test]
     fn blocks_last_a_second_and_end_with_their_log() {

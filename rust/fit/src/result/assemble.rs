@@ -55,9 +55,9 @@ pub fn assemble<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         let weights = &headline.weights;
         let errors = Errors::new(context, &compared, &weights.holdout.zeros, options.seed);
         let free = FreeRuns::new(context, &compared);
-        let beside_zeros = errors.beside_zeros(&context.holdout.measured);
+        let beside_zeros = errors.beside_zeros();
         let gap = gap(context, &compared, &errors, &free, weights, description, options);
-        (gap, beside_zeros, errors.series(context), free.series())
+        (gap, beside_zeros, errors.series(), free.series())
     };
     let residual = || {
         let residuals = residual_torques(context, &compared, &headline.weights.holdout);
@@ -85,6 +85,7 @@ pub fn assemble<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         if remains { context.laws_beside(&headline.model, &headline.weights, rotary) } else { Vec::new() };
     let sanity = sanity(description.kind, &estimates(&headline.model, description), remains);
     let mut notes = notes(headline, options.max_causes, remains, &sanity, &gap, description);
+    notes.extend(left_out(context));
     notes.extend(gap.training.as_ref().map(|found| remark(found, &[rotary; N])));
     Diagnosis {
         schema: "armgap.diagnosis/1",
@@ -287,7 +288,7 @@ fn ranking<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     rotary: bool,
 ) -> Vec<Ranked> {
     let node = &attribution.nodes[0];
-    let data = &context.holdout.data;
+    let WindowSet { data, measured } = context.all_windows(&context.holdout);
     let offsets = data.zero_offsets();
     let ranked = |c: &Candidate<P>, closed: f64| {
         context.progress.unit();
@@ -301,7 +302,7 @@ fn ranking<A: Arm<f64, N, P>, const N: usize, const P: usize>(
             joint: effect.joint_number(),
             closed,
             trust: c.fit.prior_cost,
-            rms: rms::<N>(&context.holdout.measured, &predicted),
+            rms: rms::<N>(&measured, &predicted),
             parameters: effect_values(&effect, &sigma, rotary),
         })
     };
@@ -320,7 +321,7 @@ fn nodes<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     context: &DiagnosisContext<A, N, P>,
     attribution: &Attribution<N, P>,
 ) -> Vec<StageSummary> {
-    let data = &context.holdout.data;
+    let WindowSet { data, measured } = context.all_windows(&context.holdout);
     let offsets = data.zero_offsets();
     let summary_of = |effect: &EffectInstance| EquivalentSummary {
         effect: effect.law.spec().name,
@@ -331,10 +332,7 @@ fn nodes<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     };
     let summary = |(i, node): (usize, &crate::search::attribute::SearchNode<N, P>)| StageSummary {
         added: attribution.added(i).map(summary_of),
-        rms: rms::<N>(
-            &context.holdout.measured,
-            &data.predict(&context.arm, &node.settled.hypothesis, &offsets),
-        ),
+        rms: rms::<N>(&measured, &data.predict(&context.arm, &node.settled.hypothesis, &offsets)),
         excess: node.excess(),
         relative_error: node.relative_error(),
         trust: node.base.fit.prior_cost,
@@ -430,6 +428,21 @@ fn notes<const N: usize, const P: usize>(
     );
     notes.extend(narrowed(description));
     notes
+}
+
+/// Remark on windows that are not fitted to, because pushes act in them; none where all windows are.
+fn left_out<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    context: &DiagnosisContext<A, N, P>,
+) -> Option<String> {
+    let samples = [&context.training, &context.holdout];
+    let all: usize = samples.iter().map(|sample| context.all_windows(sample).data.windows.len()).sum();
+    let fitted: usize = samples.iter().map(|sample| sample.data.windows.len()).sum();
+    (fitted < all).then(|| {
+        let left_out = all - fitted;
+        format!(
+            "the arm and its causes are fitted without the {left_out} of {all} windows in which pushes act"
+        )
+    })
 }
 
 /// Remark on how encoder zeros that differ between recordings change the gap; none where the change is small.

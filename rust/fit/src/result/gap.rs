@@ -41,6 +41,8 @@ pub struct Compared<const P: usize> {
 
 /// Predicted positions on the holdout from measured initial states for the three compared models, and their noise floor.
 pub struct Errors<const N: usize> {
+    /// All windows of the holdout, those in which pushes act too.
+    sample: WindowSet<N>,
     before: Vec<f64>,
     refit: Vec<f64>,
     after: Vec<f64>,
@@ -58,7 +60,8 @@ impl<const N: usize> Errors<N> {
         zeros: &EncoderZeros<N>,
         seed: u64,
     ) -> Self {
-        let data = &context.holdout.data;
+        let sample = context.all_windows(&context.holdout);
+        let data = &sample.data;
         let offsets = data.zero_offsets();
         let bare = data.without_pushes();
         let after = data.predict(&context.arm, &compared.after, &offsets);
@@ -68,25 +71,19 @@ impl<const N: usize> Errors<N> {
             floor: floor(context, data, &compared.after, &after, seed),
             with_zeros: data.predict(&context.arm, &compared.after, &zeros.offsets(data)),
             after,
+            sample,
         }
     }
 
     /// RMS error per joint, rad or m, of the model with causes and the encoder zeros fitted to the holdout's recordings, so that their scatter does
     /// not count.
-    pub fn beside_zeros(&self, measured: &[f64]) -> Vec<f64> {
-        rms::<N>(measured, &self.with_zeros)
+    pub fn beside_zeros(&self) -> Vec<f64> {
+        rms::<N>(&self.sample.measured, &self.with_zeros)
     }
 
     /// Measured and predicted positions of the holdout windows, for drawing.
-    pub fn series<A: Arm<f64, N, P>, const P: usize>(
-        &self,
-        context: &DiagnosisContext<A, N, P>,
-    ) -> Vec<Series> {
-        window_series(
-            &context.holdout.data,
-            &context.holdout.measured,
-            [&self.before, &self.refit, &self.after],
-        )
+    pub fn series(&self) -> Vec<Series> {
+        window_series(&self.sample.data, &self.sample.measured, [&self.before, &self.refit, &self.after])
     }
 }
 
@@ -100,7 +97,7 @@ pub fn gap<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     description: &ArmDescription,
     options: &Options,
 ) -> Gap {
-    let measured = &context.holdout.measured;
+    let measured = &errors.sample.measured;
     let floor: Vec<f64> = errors.floor.iter().map(|v| v.sqrt()).collect();
     let before = rms::<N>(measured, &errors.before);
     let after = rms::<N>(measured, &errors.after);
@@ -109,10 +106,10 @@ pub fn gap<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         horizon_s: options.horizon,
         unit: if description.kind.rotary() { "rad" } else { "m" },
         closed: closed(&before, &after, &floor),
-        closed_ci: closed_interval(context, errors, &floor, options.seed),
+        closed_ci: closed_interval(errors, &floor, options.seed),
         unexplained: (1.0 - closed(&refit, &after, &floor)).clamp(0.0, 1.0),
         refit,
-        motion: rms::<N>(measured, &context.holdout.still()),
+        motion: rms::<N>(measured, &errors.sample.still()),
         horizons: HORIZONS
             .par_iter()
             .filter_map(|h| at_horizon(context, compared, *h, options.seed))
@@ -197,15 +194,10 @@ fn before_scale(before: &[f64]) -> f64 {
 }
 
 /// 95 % interval of the closed share of the gap, from bootstrap resamples of the holdout's blocks of windows.
-fn closed_interval<A: Arm<f64, N, P>, const N: usize, const P: usize>(
-    context: &DiagnosisContext<A, N, P>,
-    errors: &Errors<N>,
-    floor: &[f64],
-    seed: u64,
-) -> [f64; 2] {
-    let data = &context.holdout.data;
+fn closed_interval<const N: usize>(errors: &Errors<N>, floor: &[f64], seed: u64) -> [f64; 2] {
+    let WindowSet { data, measured } = &errors.sample;
     let squares = |predicted: &[f64], w: &Window<N>, j: usize| -> f64 {
-        let pairs = context.holdout.measured[w.range()].iter().zip(&predicted[w.range()]);
+        let pairs = measured[w.range()].iter().zip(&predicted[w.range()]);
         pairs.skip(j).step_by(N).map(|(a, b)| (a - b).powi(2)).sum()
     };
     let table = |predicted: &[f64]| -> Vec<[f64; N]> {

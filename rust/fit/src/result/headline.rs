@@ -161,6 +161,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let mut changed = !disturbance_candidates.is_empty();
         if let Some(alone) = alone.filter(|_| changed && disturbances.is_empty()) {
             attribution = alone;
+            self.take_all_windows();
             self.set_pushes(&[]);
             self.weigh(&mut attribution);
             (causes, candidates) = sorted_causes(&attribution.causes, most);

@@ -3,30 +3,29 @@
 //! An effect may act where only the training logs went, as backlash of a joint whose torque reverses in the first part of a log. A gap that only they
 //! show is a gap too, although the holdout cannot judge its causes.
 
-use crate::likelihood::context::DiagnosisContext;
+use crate::likelihood::context::{DiagnosisContext, WindowSet};
 use crate::likelihood::encoder_zero::EncoderZeros;
 use crate::model::hypothesis::Hypothesis;
 use crate::numeric::products::rms;
-use crate::predict::window::Dataset;
 use crate::result::floor::floor;
 use crate::result::report::TrainingErrors;
 use crate::result::verdict::stands_out;
 use armgap_core::arm::Arm;
 
-/// Errors of a model on the training logs `data` (with or without external pushes), beside the encoder zeros of their recordings; none where they are
+/// Errors of a model on the training windows `sample` (with or without external pushes), beside the encoder zeros of their recordings; none where they are
 /// within noise or of no consequence in relation to the motion.
 pub fn training_gap<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     context: &DiagnosisContext<A, N, P>,
-    data: &Dataset<N>,
+    sample: &WindowSet<N>,
     model: &Hypothesis<P>,
     zeros: &EncoderZeros<N>,
     seed: u64,
 ) -> Option<TrainingErrors> {
-    let measured = &context.training.measured;
+    let WindowSet { data, measured } = sample;
     let plain = data.predict(&context.arm, model, &data.zero_offsets());
     let floor = floor(context, data, model, &plain, seed).map(f64::sqrt).to_vec();
     let after = rms::<N>(measured, &data.predict(&context.arm, model, &zeros.offsets(data)));
-    let motion = rms::<N>(measured, &context.training.still());
+    let motion = rms::<N>(measured, &sample.still());
     stands_out(&after, &floor, &motion).then_some(TrainingErrors { after, floor })
 }
 

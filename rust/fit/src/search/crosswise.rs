@@ -37,9 +37,9 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     pub(crate) fn holdout_shows_more(&self, attribution: &Attribution<N, P>) -> bool {
         let Some(last) = attribution.nodes.last() else { return false };
         let per_row = |costs: &[f64], rows: usize| costs.iter().sum::<f64>() / rows as f64;
-        let holdout = self.judge(&last.weights.holdout).raw_costs(&last.base.fit.hypothesis);
-        per_row(&holdout, self.holdout.data.rows)
-            > MORE * per_row(&last.base.fit.costs, self.training.data.rows)
+        let [training, holdout] = [&self.training, &self.holdout].map(|sample| self.all_windows(sample));
+        let costs = self.on(&holdout, &last.weights.holdout).raw_costs(&last.base.fit.hypothesis);
+        per_row(&costs, holdout.data.rows) > MORE * per_row(&last.base.fit.costs, training.data.rows)
     }
 }
 

@@ -38,11 +38,6 @@ impl<const N: usize, const P: usize> Attribution<N, P> {
         added(&self.nodes.iter().collect::<Vec<_>>(), node)
     }
 
-    /// RMS prediction error of the final model on the holdout relative to the RMS motion within the windows.
-    pub fn error(&self) -> f64 {
-        self.nodes.last().map_or(f64::INFINITY, SearchNode::relative_error)
-    }
-
     /// Whether the final model leaves a gap of consequence whose cost exceeds the noise floor by more than the factor `UNEXPLAINED`.
     pub fn is_unexplained(&self) -> bool {
         self.nodes.last().is_some_and(SearchNode::is_unexplained)
