@@ -134,7 +134,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         self.leave_out_pushes();
         let beside = self.attribute(max_causes, seed, law);
         let clear = self.take_all_windows();
-        if !beside.is_unexplained() {
+        if !beside.leaves_a_remainder() {
             disturbances = self.pushes(&beside, faint);
         }
         self.set_pushes(&disturbances);
@@ -165,7 +165,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             covariance: &attribution.model.covariance.matrix,
             scale: last.weights.training.scale,
             zeros: &last.weights.holdout.zeros,
-            remainder: attribution.is_unexplained(),
+            remainder: attribution.leaves_a_remainder(),
             min_relevance: min_relevance(first.relative_error()),
             faintest: if faint { FAINTEST } else { min_relevance(first.relative_error()) },
         };

@@ -152,7 +152,7 @@ impl<const N: usize, const P: usize> SearchNode<N, P> {
     }
 
     /// Whether the cost of a typical holdout window is about what measurement noise alone leaves.
-    fn is_typically_noise(&self) -> bool {
+    pub fn is_typically_noise(&self) -> bool {
         self.weights.holdout.typical < AT_FLOOR * self.floor / self.base.holdout.len() as f64
     }
 

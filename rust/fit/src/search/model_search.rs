@@ -42,6 +42,12 @@ impl<const N: usize, const P: usize> Attribution<N, P> {
     pub fn is_unexplained(&self) -> bool {
         self.nodes.last().is_some_and(SearchNode::is_unexplained)
     }
+
+    /// Whether the final model leaves a gap as [`Self::is_unexplained`] says, and leaves it in typical windows too: a few windows far above others that are at
+    /// the noise floor show pushes, and no lack of the model.
+    pub fn leaves_a_remainder(&self) -> bool {
+        self.is_unexplained() && !self.nodes.last().is_some_and(SearchNode::is_typically_noise)
+    }
 }
 
 /// The effect that the search added to the model of the search node with index `node`; none if it added none.
