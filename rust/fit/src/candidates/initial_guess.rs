@@ -89,13 +89,6 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         initial_guesses
     }
 
-    /// Largest part of the training windows' cost above the noise floor that a single candidate removes to first order.
-    pub(crate) fn largest_gain(&self, fit: &Fit<P>, weights: &SplitWeighting<N>, tests: &[ScoreTest]) -> f64 {
-        let gains = tests.iter().map(|test| test.gain);
-        let cost: f64 = self.problem(&weights.training).window_costs(&fit.hypothesis).iter().sum();
-        gains.fold(0.0, f64::max) / self.above_floor(cost, weights)
-    }
-
     /// Part of the training windows' cost `cost` above the expected cost of measurement noise alone.
     fn above_floor(&self, cost: f64, weights: &SplitWeighting<N>) -> f64 {
         let rows = self.training.data.rows as f64 / self.holdout.data.rows as f64;
@@ -136,22 +129,6 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let traces = Traces::keep(&fit.hypothesis, &candidates, &traces, scale).map(Arc::new);
         let own_traces = !is_earlier.contains(&true);
         Screening { candidates, tests, jacobian, traces, own_traces }
-    }
-
-    /// Score tests of all candidates around a fit, by the traces `known` of an earlier node where there are some, also beside other transmissions.
-    pub(crate) fn screened_roughly(
-        &self,
-        fit: &Fit<P>,
-        weights: &SplitWeighting<N>,
-        known: &Traces<N>,
-    ) -> Vec<ScoreTest> {
-        let candidates = self.candidates_around(fit, weights);
-        let problem = self.problem(&weights.training);
-        let jacobian = problem.jacobian(&fit.hypothesis);
-        let point = TestPoint::new(&problem, &fit.hypothesis, &jacobian);
-        let earlier = |c: &EffectInstance| known.whitened(c, &weights.training.scale);
-        let (traces, _) = point.traces_beside(&candidates, earlier);
-        point.tests(&candidates, &traces)
     }
 
     /// All candidates that a fit may lack, at their initial guesses, those that do not depend on its residual first.

@@ -27,9 +27,6 @@ pub(super) const SHORTEST: f64 = 0.005;
 /// Largest time between successive pieces of one recording, in sample periods.
 const FOLLOWS: f64 = 8.0;
 
-/// Part of a joint's travel next to either limit that counts as its end.
-const NEAR_END: f64 = 0.12;
-
 /// Factor on the probability of a push, and so its largest value, where the model leaves the whole gap unexplained.
 const REMAINDER_DOUBT: f64 = 0.5;
 
@@ -192,8 +189,6 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             for place in places {
                 self.in_outlying_windows(*place, state, &own, &mut disturbances);
             }
-            let all: Vec<Bell> = disturbances.iter().map(Disturbance::as_bell).collect();
-            disturbances.retain(|e| !self.meets_an_end(e, &all));
         }
         // `MAX_PUSHES` or more are no rare events, but something that the arm does again and again.
         if disturbances.iter().filter(|e| !e.light).count() >= MAX_PUSHES {
@@ -220,25 +215,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
                 disturbances.extend(self.sized(Disturbance { light, ..rough }, state, own, &disturbances));
             }
         }
-        let all = [found.bells, found.light].concat();
-        disturbances.retain(|e| e.is_known() && !self.meets_an_end(e, &all));
+        disturbances.retain(Disturbance::is_known);
         disturbances
-    }
-
-    /// Whether a push and a further one on its joint both drive the joint back from one end of the joint's travel, as contact with a stop does.
-    fn meets_an_end(&self, disturbance: &Disturbance, bells: &[Bell]) -> bool {
-        let joint = disturbance.push.joint;
-        let [from, to] = self.scales.travel[joint];
-        let end = |q: f64, height: f64| -> i8 {
-            let depth = (q - from) / (to - from);
-            i8::from(depth > 1.0 - NEAR_END && height < 0.0) - i8::from(depth < NEAR_END && height > 0.0)
-        };
-        let track = self.track(disturbance.place());
-        let at = |t: f64| track.q[track.t.partition_point(|x| *x < t).min(track.len() - 1)][joint];
-        let own = end(at(disturbance.push.p[1]), disturbance.push.p[0]);
-        let inside =
-            |b: &&Bell| b.joint == joint && (track.t[0]..=track.t[track.len() - 1]).contains(&b.time);
-        own != 0 && bells.iter().filter(inside).filter(|b| end(at(b.time), b.height) == own).count() > 1
     }
 
     /// First estimate of a push from a Gaussian pulse in the residual torque; `rest` is the size of the largest pulse that is no push.
@@ -321,12 +299,6 @@ impl Disturbance {
     /// Impulse of the push in standard deviations.
     pub fn clarity(&self) -> f64 {
         self.push.p[0].abs() / self.sigma[0]
-    }
-
-    /// Gaussian pulse with the joint, time and sign of the push.
-    fn as_bell(&self) -> Bell {
-        let [height, time, width] = self.push.p;
-        Bell { joint: self.push.joint, time, width, height, sigma: self.sigma[0], z: 0.0 }
     }
 
     /// Index of the log in which the push acts: 0 for the training set or 1 for the holdout, then the index within the set.

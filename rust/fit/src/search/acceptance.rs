@@ -332,19 +332,12 @@ pub fn is_regularisation<const N: usize, const P: usize>(
 }
 
 /// Whether a candidate adds an effect with which fitted parameters that were implausible return towards their prior values, which is a ground to
-/// accept it.
+/// accept it: implausibly far without the candidate, much closer with it (prior cost lower by more than `TRUST_GAIN` and below 0.4 times), while
+/// the total cost falls.
 pub fn restores<const N: usize, const P: usize>(node: &SearchNode<N, P>, candidate: &Candidate<P>) -> bool {
-    candidate.effect.is_some() && brings_back(node, candidate)
-}
-
-/// Whether the fitted parameters are implausibly far from their prior values without a candidate and much closer to them with it (prior cost lower by
-/// more than `TRUST_GAIN` and below 0.4 times), while the total cost falls.
-pub fn brings_back<const N: usize, const P: usize>(
-    node: &SearchNode<N, P>,
-    candidate: &Candidate<P>,
-) -> bool {
     let [before, after] = [&node.base, candidate].map(|c| c.fit.prior_cost / node.prior_inflation());
-    !is_plausible::<P>(before)
+    candidate.effect.is_some()
+        && !is_plausible::<P>(before)
         && before - after > TRUST_GAIN
         && after < 0.4 * before
         && candidate.score() < node.base.score()

@@ -169,12 +169,6 @@ impl<const N: usize, const P: usize> SearchNode<N, P> {
         self.relative_error() > CONSEQUENTIAL_ERROR && self.excess() > UNEXPLAINED
     }
 
-    /// Whether the current model leaves a gap above the noise floor and large enough for a further effect to improve the predictions by
-    /// `min_relevance` (RMS, relative to the motion within a window).
-    pub fn is_worth_more(&self, min_relevance: f64) -> bool {
-        self.relative_error() > min_relevance && self.excess() > ABOVE_FLOOR
-    }
-
     /// Ratio of the current model's cost on the holdout to its noise floor.
     pub fn excess(&self) -> f64 {
         self.base.holdout.iter().sum::<f64>() / self.floor

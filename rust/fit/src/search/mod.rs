@@ -9,7 +9,6 @@
 //! * `model_search`: stepwise selection: one cause is added after another, and causes that become idle are dropped.
 //! * `reconsider`: replacement of a cause by a rival candidate that explains the windows better once the other causes are known.
 //! * `rivals`: close candidates compared in pairs, equivalent effects, and a table over one variable of the motion as the rival of a named cause.
-//! * `together`: two causes of which neither is accepted alone.
 
 pub mod acceptance;
 pub mod attribute;
@@ -20,4 +19,3 @@ pub(crate) mod friction_regularisation;
 pub mod model_search;
 pub(crate) mod reconsider;
 pub mod rivals;
-pub(crate) mod together;

@@ -12,7 +12,6 @@ use crate::search::acceptance::{
 };
 use crate::search::attribute::{Candidate, SearchNode};
 use crate::search::belief::{Cause, name};
-use crate::search::together::Both;
 use armgap_core::arm::Arm;
 
 /// Result of a model search: the models, the accepted causes and the search nodes.
@@ -79,15 +78,7 @@ pub(crate) struct ModelSearch<const N: usize, const P: usize> {
 }
 
 impl<const N: usize, const P: usize> ModelSearch<N, P> {
-    /// Adds two causes to the search; returns the fit with both.
-    fn take_up(&mut self, both: Both<N, P>) -> Fit<P> {
-        let fit = both.node.candidates[both.choice].fit.clone();
-        self.causes.extend(both.causes);
-        self.move_to(both.node);
-        fit
-    }
-
-    /// Moves the search on to `node`. Of the nodes before it only the first keeps its traces, for a restart.
+    /// Moves the search on to `node`. Of the nodes before it only the first keeps its traces, for a rival of the first cause.
     fn move_to(&mut self, node: SearchNode<N, P>) {
         let mut before = std::mem::replace(&mut self.node, node);
         if !self.nodes.is_empty() {
@@ -123,9 +114,6 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             self.advance(&mut search, &fit, min_relevance);
         }
         self.pursue(&mut search, min_relevance, max_causes, seed);
-        if search.node.is_unexplained() && !search.causes.is_empty() && max_causes > 1 {
-            search = self.restarted(search, min_relevance, max_causes, seed);
-        }
         let ModelSearch { mut causes, mut nodes, node, .. } = search;
         let mut model = node.settled.clone();
         let without = self.prune(&mut model, &mut causes, &node);
@@ -167,7 +155,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         }
     }
 
-    /// Adds one cause after another, or two at once, until no candidate is accepted.
+    /// Adds one cause after another until no candidate is accepted.
     pub(crate) fn pursue(
         &self,
         search: &mut ModelSearch<N, P>,
@@ -194,58 +182,17 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
                     search.regularised = true;
                     self.with_widths_refined(node, chosen.clone()).fit
                 }
-            } else if let Some(fit) =
-                (!search.regularisation_fitted).then(|| self.regularisation(node)).flatten()
-            {
+            } else {
+                let wanted = !search.regularisation_fitted;
+                let Some(fit) = wanted.then(|| self.regularisation(node)).flatten() else { break };
                 (search.regularised, search.regularisation_fitted) = (true, true);
                 fit
-            } else {
-                let room = search.causes.len() + 2 <= max_causes;
-                let pair = room.then(|| self.together(node, None, search.threshold, seed)).flatten();
-                let Some(both) = pair else { break };
-                search.take_up(both)
             };
-            let rounding = search.node.settled.hypothesis.rounding;
             self.advance(search, &next, min_relevance);
-            if next.hypothesis.rounding != rounding {
-                self.drop_idle(search, min_relevance);
-            }
         }
         if let Some(other) = self.reconsidered(search, true, min_relevance, max_causes, seed) {
             *search = other;
         }
-    }
-
-    /// Drops the causes that only imitated regularised friction, once friction is regularised in the model, and moves the search on to the node
-    /// without them.
-    fn drop_idle(&self, search: &mut ModelSearch<N, P>, min_relevance: f64) {
-        let (mut model, known) = (search.node.settled.clone(), search.causes.len());
-        self.prune(&mut model, &mut search.causes, &search.node);
-        if search.causes.len() < known {
-            self.advance(search, &model, min_relevance);
-        }
-    }
-
-    /// Restarts a search that has ended with a gap, from its first node with a pair of causes, as the first cause may have been accepted in place of
-    /// the two. The search is returned unchanged if no pair explains nearly all of the gap.
-    fn restarted(
-        &self,
-        mut search: ModelSearch<N, P>,
-        min_relevance: f64,
-        max_causes: usize,
-        seed: u64,
-    ) -> ModelSearch<N, P> {
-        let first = &search.nodes[0];
-        let taken = search.causes[0].effect;
-        let Some(both) = self.together(first, Some(&taken), min_relevance, seed) else { return search };
-        search.node = search.nodes.swap_remove(0);
-        search.nodes.clear();
-        search.causes.clear();
-        (search.regularised, search.regularisation_fitted) = (false, false);
-        let next = search.take_up(both);
-        self.advance(&mut search, &next, min_relevance);
-        self.pursue(&mut search, min_relevance, max_causes, seed);
-        search
     }
 
     /// Moves a search on to the node around the fit `next`.
