@@ -51,9 +51,20 @@ def test_what_only_the_holdout_shows_is_named(beside_an_offset):
     assert causes["torque_offset", 1].parameters["offset"].value == pytest.approx(1.0, rel=0.01)
 
 
-def test_it_is_said_that_the_logs_were_cut(beside_an_offset):
-    assert any(r.startswith(CROSSWISE) for r in beside_an_offset.remarks)
-    assert CROSSWISE in render_html(beside_an_offset)
+def test_it_is_said_that_the_logs_were_cut():
+    """A spring whose torque grows with the third power hardly acts in the training log, and no pushes can take its place."""
+    arm = Arm.read(CASE_FOLDER / "arm.toml")
+    t = np.arange(2400) * arm.sample_period
+    spring = Effect("hardening_spring", 2, {"cubic": 5.0, "k": 0.0, "q0": 0.0})
+    result = diagnosed(
+        [
+            simulate(arm, t, scale * sines(t, seed), effects=[spring], noise=NOISE_RAD, seed=seed, tolerance=1e-6)
+            for seed, scale in ((1, 0.15), (2, 1.0))
+        ]
+    )
+    assert [(c.effect, c.joint) for c in result.causes] == [("hardening_spring", 2)]
+    assert any(r.startswith(CROSSWISE) for r in result.remarks)
+    assert CROSSWISE in render_html(result)
 
 
 def test_where_the_training_logs_show_it_nothing_is_cut():

@@ -27,6 +27,9 @@ pub(super) const SHORTEST: f64 = 0.005;
 /// Largest time between successive pieces of one recording, in sample periods.
 const FOLLOWS: f64 = 8.0;
 
+/// Part of a joint's travel next to either limit that counts as its end.
+const NEAR_END: f64 = 0.12;
+
 /// Factor on the probability of a push, and so its largest value, where the model leaves the whole gap unexplained.
 const REMAINDER_DOUBT: f64 = 0.5;
 
@@ -57,7 +60,8 @@ pub struct Disturbance {
     pub share: f64,
     /// Probability, 0 to 1, of a push rather than some other model error.
     pub probability: f64,
-    /// Whether the torque is certain and yet too light for a push beside the scatter of friction: a first guess for `law_in_place`, never named.
+    /// Whether the torque is certain and yet too light for a push beside the scatter of friction, or looks like contact with a stop: a first guess for
+    /// `law_in_place`, never named.
     pub light: bool,
 }
 
@@ -189,6 +193,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             for place in places {
                 self.in_outlying_windows(*place, state, &own, &mut disturbances);
             }
+            let all: Vec<Bell> = disturbances.iter().map(Disturbance::as_bell).collect();
+            self.leave_to_a_stop(&mut disturbances, &all);
         }
         // `MAX_PUSHES` or more are no rare events, but something that the arm does again and again.
         if disturbances.iter().filter(|e| !e.light).count() >= MAX_PUSHES {
@@ -216,7 +222,32 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             }
         }
         disturbances.retain(Disturbance::is_known);
+        let all = [found.bells, found.light].concat();
+        self.leave_to_a_stop(&mut disturbances, &all);
         disturbances
+    }
+
+    /// Marks the pushes that look like contact with a stop beside the pulses `all`: they are not named, and give a stop its first guesses.
+    fn leave_to_a_stop(&self, disturbances: &mut [Disturbance], all: &[Bell]) {
+        for disturbance in disturbances {
+            disturbance.light |= self.meets_an_end(disturbance, all);
+        }
+    }
+
+    /// Whether a push and a further one on its joint both drive the joint back from one end of the joint's travel, as contact with a stop does.
+    fn meets_an_end(&self, disturbance: &Disturbance, bells: &[Bell]) -> bool {
+        let joint = disturbance.push.joint;
+        let [from, to] = self.scales.travel[joint];
+        let end = |q: f64, height: f64| -> i8 {
+            let depth = (q - from) / (to - from);
+            i8::from(depth > 1.0 - NEAR_END && height < 0.0) - i8::from(depth < NEAR_END && height > 0.0)
+        };
+        let track = self.track(disturbance.place());
+        let at = |t: f64| track.q[track.t.partition_point(|x| *x < t).min(track.len() - 1)][joint];
+        let own = end(at(disturbance.push.p[1]), disturbance.push.p[0]);
+        let inside =
+            |b: &&Bell| b.joint == joint && (track.t[0]..=track.t[track.len() - 1]).contains(&b.time);
+        own != 0 && bells.iter().filter(inside).filter(|b| end(at(b.time), b.height) == own).count() > 1
     }
 
     /// First estimate of a push from a Gaussian pulse in the residual torque; `rest` is the size of the largest pulse that is no push.
@@ -299,6 +330,12 @@ impl Disturbance {
     /// Impulse of the push in standard deviations.
     pub fn clarity(&self) -> f64 {
         self.push.p[0].abs() / self.sigma[0]
+    }
+
+    /// Gaussian pulse with the joint, time and sign of the push.
+    fn as_bell(&self) -> Bell {
+        let [height, time, width] = self.push.p;
+        Bell { joint: self.push.joint, time, width, height, sigma: self.sigma[0], z: 0.0 }
     }
 
     /// Index of the log in which the push acts: 0 for the training set or 1 for the holdout, then the index within the set.
