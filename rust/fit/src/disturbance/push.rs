@@ -60,8 +60,7 @@ pub struct Disturbance {
     pub share: f64,
     /// Probability, 0 to 1, of a push rather than some other model error.
     pub probability: f64,
-    /// Whether the torque is certain and yet too light for a push beside the scatter of friction, or looks like contact with a stop: a first guess for
-    /// `law_in_place`, never named.
+    /// Whether the torque is certain and yet too light for a push beside the scatter of friction: a first guess for `law_in_place`, never named.
     pub light: bool,
 }
 
@@ -194,7 +193,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
                 self.in_outlying_windows(*place, state, &own, &mut disturbances);
             }
             let all: Vec<Bell> = disturbances.iter().map(Disturbance::as_bell).collect();
-            self.leave_to_a_stop(&mut disturbances, &all);
+            disturbances.retain(|e| !self.meets_an_end(e, &all));
         }
         // `MAX_PUSHES` or more are no rare events, but something that the arm does again and again.
         if disturbances.iter().filter(|e| !e.light).count() >= MAX_PUSHES {
@@ -221,17 +220,9 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
                 disturbances.extend(self.sized(Disturbance { light, ..rough }, state, own, &disturbances));
             }
         }
-        disturbances.retain(Disturbance::is_known);
         let all = [found.bells, found.light].concat();
-        self.leave_to_a_stop(&mut disturbances, &all);
+        disturbances.retain(|e| e.is_known() && !self.meets_an_end(e, &all));
         disturbances
-    }
-
-    /// Marks the pushes that look like contact with a stop beside the pulses `all`: they are not named, and give a stop its first guesses.
-    fn leave_to_a_stop(&self, disturbances: &mut [Disturbance], all: &[Bell]) {
-        for disturbance in disturbances {
-            disturbance.light |= self.meets_an_end(disturbance, all);
-        }
     }
 
     /// Whether a push and a further one on its joint both drive the joint back from one end of the joint's travel, as contact with a stop does.
