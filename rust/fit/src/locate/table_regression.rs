@@ -14,6 +14,44 @@ const CORRELATED: f64 = 10.0;
 /// decide what of the torque the parameters take, and enough for cells that no sample is near.
 const ANCHORED: f64 = 1e-3;
 
+/// Shares of the residual torque's mean square that a regression may leave, with which its prior precisions are multiplied: those of a residual torque
+/// of which nothing is explained are too strong for one that is mostly explained.
+const LEFT_SHARES: [f64; 3] = [1.0, 0.2, 0.04];
+
+/// Weights of the tables' second differences that are tried, in independent points that have shown each to be zero.
+const STIFFNESSES: [f64; 2] = [1.0, 30.0];
+
+/// Weights of the tables' torques that are tried, in points that have shown each to be zero.
+const ZEROS: [f64; 2] = [1.0, 0.01];
+
+/// Strength of the priors of a regression.
+#[derive(Debug, Clone, Copy)]
+pub struct Priors {
+    /// Share of the residual torque's mean square that the regression is taken to leave.
+    pub left: f64,
+    /// Weight of the tables' second differences, in independent points that have shown each to be zero.
+    pub stiffness: f64,
+    /// Weight of the tables' torques, in points that have shown each to be zero.
+    pub zero: f64,
+}
+
+impl Priors {
+    /// Priors that are tried.
+    fn all() -> impl Iterator<Item = Self> {
+        let with = |left| STIFFNESSES.map(|stiffness| ZEROS.map(|zero| Self { left, stiffness, zero }));
+        LEFT_SHARES.into_iter().flat_map(move |left| with(left).into_iter().flatten())
+    }
+}
+
+/// What a regression leaves of logs that it was not fitted to.
+#[derive(Debug, Clone)]
+pub struct LeftOut {
+    /// Priors with which the regression leaves least.
+    pub priors: Priors,
+    /// Residual torque of each point after subtraction of the regression fitted to all logs but the point's own, N m or N.
+    pub left: Vec<f64>,
+}
+
 /// Low-passed residual torque of one joint over all logs, with all variables that it may depend on.
 #[derive(Debug, Clone, Default)]
 pub struct Rest {
@@ -83,30 +121,27 @@ impl Rest {
         let own = self.base.first().map_or(0, Vec::len);
         let ends = ends(own, &laws);
         let k = ends.last().copied().unwrap_or(own);
-        let mut normal = vec![(DMatrix::zeros(k, k), DVector::zeros(k)); self.logs()];
+        let mut normal = vec![NormalEquations::zero(k); self.logs()];
         for (i, y) in self.torque.iter().enumerate() {
-            let row = row(&self.base[i], &laws, i);
-            let (matrix, right) = &mut normal[self.log[i]];
-            matrix.ger(1.0, &row, &row, 1.0);
-            right.axpy(*y, &row, 1.0);
+            normal[self.log[i]].add(&row(&self.base[i], &laws, i), *y);
         }
         // The prior of the parameters is the arm file's; a class counts as if it had one further point, with a typical factor and zero torque.
         let variance = self.variance();
         let of_class = |i: usize| laws[ends.partition_point(|end| *end <= i)].factor_square;
         let zero = DVector::from_fn(k, |i, _| if i < own { 0.0 } else { of_class(i) });
         let of_parameter = |i: usize| if i + 1 < own { CORRELATED * variance } else { 1.0 };
-        let mut ridge =
-            DMatrix::from_diagonal(&DVector::from_fn(k, |i, _| if i < own { of_parameter(i) } else { 0.0 }));
+        let parameters = DVector::from_fn(k, |i, _| if i < own { of_parameter(i) } else { 0.0 });
         // The second differences count as if one independent point had shown each of them to be zero (P-splines, Eilers and Marx 1996).
+        let mut bends = DMatrix::zeros(k, k);
         for (law, end) in laws.iter().zip(&ends) {
             let (first, precision) = (end - law.count(), CORRELATED * law.factor_square);
             for bend in law.bends() {
                 for ((a, u), (b, v)) in bend.iter().flat_map(|a| bend.iter().map(move |b| (*a, *b))) {
-                    ridge[(first + a, first + b)] += precision * u * v;
+                    bends[(first + a, first + b)] += precision * u * v;
                 }
             }
         }
-        Regression { rest: self, laws, normal, ridge, zero: DMatrix::from_diagonal(&zero) }
+        Regression { rest: self, laws, normal, parameters, bends, zero }
     }
 
     /// Indices of the points of the logs that tables are fitted to.
@@ -136,18 +171,49 @@ impl Rest {
 pub struct Regression<'a> {
     rest: &'a Rest,
     laws: Vec<&'a Classes>,
-    normal: Vec<(DMatrix<f64>, DVector<f64>)>,
-    /// Prior precision of the parameters and of the tables' second differences.
-    ridge: DMatrix<f64>,
+    normal: Vec<NormalEquations>,
+    /// Prior precision of the parameters.
+    parameters: DVector<f64>,
+    /// Prior precision of the tables' second differences.
+    bends: DMatrix<f64>,
     /// Precision of the expectation that a class has no torque.
-    zero: DMatrix<f64>,
+    zero: DVector<f64>,
 }
 
-/// Regressor row of a point: the row `base` without tables, then the share of every class of each table's variable around the point.
-fn row(base: &[f64], laws: &[&Classes], point: usize) -> DVector<f64> {
+/// Normal equations of some points: matrix and right-hand side.
+#[derive(Debug, Clone)]
+struct NormalEquations {
+    matrix: DMatrix<f64>,
+    right: DVector<f64>,
+}
+
+impl NormalEquations {
+    /// Those of no point, for `k` values.
+    fn zero(k: usize) -> Self {
+        Self { matrix: DMatrix::zeros(k, k), right: DVector::zeros(k) }
+    }
+
+    /// Adds a point with the regressor `row` and the value `y`.
+    fn add(&mut self, row: &[(usize, f64)], y: f64) {
+        for (a, u) in row {
+            self.right[*a] += y * u;
+            for (b, v) in row {
+                self.matrix[(*b, *a)] += u * v;
+            }
+        }
+    }
+}
+
+/// Regressor row of a point, without its zeros, as indices and values: the row `base` without tables, then the share of every class of each table's
+/// variable around the point.
+fn row(base: &[f64], laws: &[&Classes], point: usize) -> Vec<(usize, f64)> {
     let shares = laws.iter().flat_map(|law| &law.share[point]);
-    let width = ends(base.len(), laws).last().copied().unwrap_or(base.len());
-    DVector::from_iterator(width, base.iter().chain(shares).copied())
+    base.iter().chain(shares).copied().enumerate().filter(|(_, x)| *x != 0.0).collect()
+}
+
+/// Residual torque at a point with the regressor `row` after subtraction of a regression with the coefficients `values`.
+fn left(rest: &Rest, point: usize, row: &[(usize, f64)], values: &DVector<f64>) -> f64 {
+    rest.torque[point] - row.iter().map(|(i, x)| x * values[*i]).sum::<f64>()
 }
 
 /// Indices in a regressor row behind each table's classes, the first of which follow `base` entries.
@@ -161,48 +227,65 @@ fn ends(base: usize, laws: &[&Classes]) -> Vec<usize> {
 
 impl Regression<'_> {
     /// Sum of the normal equations of the logs selected by `wanted`.
-    fn unpenalised(&self, wanted: impl Fn(usize) -> bool) -> (DMatrix<f64>, DVector<f64>) {
-        let k = self.ridge.nrows();
-        let mut whole = (DMatrix::zeros(k, k), DVector::zeros(k));
-        for (_, (matrix, right)) in self.normal.iter().enumerate().filter(|(log, _)| wanted(*log)) {
-            whole.0 += matrix;
-            whole.1 += right;
+    fn unpenalised(&self, wanted: impl Fn(usize) -> bool) -> NormalEquations {
+        let mut whole = NormalEquations::zero(self.zero.len());
+        for (_, of_log) in self.normal.iter().enumerate().filter(|(log, _)| wanted(*log)) {
+            whole.matrix += &of_log.matrix;
+            whole.right += &of_log.right;
         }
         whole
     }
 
-    fn row(&self, point: usize) -> DVector<f64> {
+    fn row(&self, point: usize) -> Vec<(usize, f64)> {
         row(&self.rest.base[point], &self.laws, point)
     }
 
     /// Residual torque at a point after subtraction of the regression with the coefficients `values`.
     fn left(&self, values: &DVector<f64>, point: usize) -> f64 {
-        self.rest.torque[point] - self.row(point).dot(values)
+        left(self.rest, point, &self.row(point), values)
     }
 
-    /// Residual torque of each point after subtraction of the regression fitted to all logs but the point's own, N m or N; `None` if such a fit is
-    /// singular.
-    pub fn left_out(&self) -> Option<Vec<f64>> {
-        let values: Vec<DVector<f64>> = (0..self.rest.logs())
-            .map(|log| {
-                let (matrix, right) = self.unpenalised(|other| other != log);
-                (matrix + &self.ridge + &self.zero).cholesky().map(|system| system.solve(&right))
-            })
-            .collect::<Option<_>>()?;
-        Some((0..self.rest.torque.len()).map(|i| self.left(&values[self.rest.log[i]], i)).collect())
+    /// Prior precision of parameters and tables for a residual torque of which nothing is explained, with the weights `stiffness` of second differences
+    /// and `zero` of the tables' torques.
+    fn precision(&self, stiffness: f64, zero: f64) -> DMatrix<f64> {
+        let mut precision = stiffness * &self.bends;
+        precision.set_diagonal(&(precision.diagonal() + &self.parameters + zero * &self.zero));
+        precision
+    }
+
+    /// What the regression leaves of logs that it was not fitted to, with the priors with which it leaves least, of those no weaker than what is left asks
+    /// for: with free parameters a gain of the command would explain everything. `None` if every fit is singular.
+    pub fn left_out(&self) -> Option<LeftOut> {
+        let others: Vec<NormalEquations> =
+            (0..self.rest.logs()).map(|log| self.unpenalised(|other| other != log)).collect();
+        let rows: Vec<Vec<(usize, f64)>> = (0..self.rest.torque.len()).map(|i| self.row(i)).collect();
+        let whole = squares(&self.rest.torque);
+        let with = |priors: Priors| {
+            let precision = priors.left * self.precision(priors.stiffness, priors.zero);
+            let solved = |normal: &NormalEquations| {
+                (&normal.matrix + &precision).cholesky().map(|system| system.solve(&normal.right))
+            };
+            let values: Vec<DVector<f64>> = others.iter().map(solved).collect::<Option<_>>()?;
+            let left =
+                |(i, row): (usize, &Vec<(usize, f64)>)| left(self.rest, i, row, &values[self.rest.log[i]]);
+            let left: Vec<f64> = rows.iter().enumerate().map(left).collect();
+            (priors.left >= 1.0 || squares(&left) < priors.left * whole).then_some(LeftOut { priors, left })
+        };
+        Priors::all().filter_map(with).min_by(|a, b| squares(&a.left).total_cmp(&squares(&b.left)))
     }
 
     /// Last table of the regression, fitted to the logs with `teaches`, beside parameters expected at the arm file's values. All prior precisions are
     /// those of a residual torque of which the tables explain nothing, times the share of its variance that they leave. What table and parameters can
     /// both take is shared as the arm file's standard deviations say.
-    pub fn last_table(&self) -> Option<Table> {
+    pub fn last_table(&self, stiffness: f64) -> Option<Table> {
+        let held = self.precision(stiffness, ANCHORED);
         let whole = self.unpenalised(|log| self.rest.teaches[log]);
         let blocks = self.blocks();
         let share = |fitted: &Fitted| (fitted.left / self.rest.variance()).min(1.0);
-        let first = self.fitted(&whole, &blocks, 1.0)?;
-        let second = self.fitted(&whole, &blocks, share(&first))?;
-        let of_prior = share(&second);
-        let Fitted { values, without, left } = self.fitted(&whole, &blocks, of_prior)?;
+        let first = self.fitted(&whole, &blocks, &held)?;
+        let second = self.fitted(&whole, &blocks, &(share(&first) * &held))?;
+        let prior = share(&second) * held;
+        let Fitted { values, without, left } = self.fitted(&whole, &blocks, &prior)?;
         let last = self.laws.last()?;
         let (k, classes) = (values.len(), last.count());
         let first = k - classes;
@@ -214,8 +297,7 @@ impl Regression<'_> {
         }
         // Covariance by the jackknife over blocks, and that due to the prior, without which a table would be too sure where the parameters may take
         // its part and where it bends (Nychka, J. Am. Stat. Assoc. 83, 1988).
-        let prior = of_prior * self.held();
-        let inverse = (whole.0 + &prior).cholesky()?.inverse();
+        let inverse = (whole.matrix + &prior).cholesky()?.inverse();
         let count = without.len() as f64;
         let covariance =
             without.iter().fold(&inverse * (CORRELATED * left * prior) * &inverse, |sum, other| {
@@ -239,61 +321,48 @@ impl Regression<'_> {
         })
     }
 
-    /// Prior precision of parameters and tables in a table that results show.
-    fn held(&self) -> DMatrix<f64> {
-        &self.ridge + ANCHORED * &self.zero
-    }
-
     /// Normal equations of every block of the logs with `teaches`, and the indices of its points.
     fn blocks(&self) -> Vec<Block> {
         let mut blocks: Vec<Block> = Vec::new();
         let mut last = None;
         for i in self.rest.taught() {
             if last != Some(self.rest.block[i]) {
-                let k = self.ridge.nrows();
-                blocks.push(Block { normal: (DMatrix::zeros(k, k), DVector::zeros(k)), points: Vec::new() });
+                let normal = NormalEquations::zero(self.zero.len());
+                blocks.push(Block { normal, points: Vec::new() });
                 last = Some(self.rest.block[i]);
             }
-            let Some(Block { normal: (matrix, right), points }) = blocks.last_mut() else { continue };
-            let row = self.row(i);
-            matrix.ger(1.0, &row, &row, 1.0);
-            right.axpy(self.rest.torque[i], &row, 1.0);
+            let Some(Block { normal, points }) = blocks.last_mut() else { continue };
+            normal.add(&self.row(i), self.rest.torque[i]);
             points.push(i);
         }
         blocks
     }
 
-    /// Fits to the normal equations `whole` and to these without each of `blocks`, with the prior precisions times `share`; `None` if one is singular or
-    /// there is no block.
-    fn fitted(
-        &self,
-        (normal, right): &(DMatrix<f64>, DVector<f64>),
-        blocks: &[Block],
-        share: f64,
-    ) -> Option<Fitted> {
-        let prior = share * self.held();
-        let away = DVector::from_fn(right.len(), |i, _| self.rest.away.get(i).copied().unwrap_or(0.0));
-        let pull = &prior * away;
+    /// Fits to the normal equations `whole` and to these without each of `blocks`, with the precision `prior`; `None` if one is singular or there is no
+    /// block.
+    fn fitted(&self, whole: &NormalEquations, blocks: &[Block], prior: &DMatrix<f64>) -> Option<Fitted> {
+        let away = DVector::from_fn(whole.right.len(), |i, _| self.rest.away.get(i).copied().unwrap_or(0.0));
+        let pull = prior * away;
         let solve = |normal: DMatrix<f64>, right: DVector<f64>| {
-            (normal + &prior).cholesky().map(|system| system.solve(&(right + &pull)))
+            (normal + prior).cholesky().map(|system| system.solve(&(right + &pull)))
         };
         let without: Vec<DVector<f64>> = blocks
             .iter()
-            .map(|block| solve(normal - &block.normal.0, right - &block.normal.1))
+            .map(|block| solve(&whole.matrix - &block.normal.matrix, &whole.right - &block.normal.right))
             .collect::<Option<_>>()?;
         let left_of = |(block, values): (&Block, &DVector<f64>)| -> f64 {
             block.points.iter().map(|i| self.left(values, *i).powi(2)).sum()
         };
         let left: f64 = blocks.iter().zip(&without).map(left_of).sum();
         let count = blocks.iter().map(|block| block.points.len()).sum::<usize>();
-        let values = solve(normal.clone(), right.clone())?;
+        let values = solve(whole.matrix.clone(), whole.right.clone())?;
         (count > 0).then(|| Fitted { values, without, left: left / count as f64 })
     }
 }
 
 /// Part of a regression that rests on the points of one block.
 struct Block {
-    normal: (DMatrix<f64>, DVector<f64>),
+    normal: NormalEquations,
     points: Vec<usize>,
 }
 
@@ -340,7 +409,7 @@ mod tests {
         }
         let form = TableForm::over(MotionVariable::Time);
         let classes = Classes { form, nodes: [nodes, vec![]], share, factor_square: 1.0 };
-        rest.regression(vec![&classes]).last_table().unwrap()
+        rest.regression(vec![&classes]).last_table(1.0).unwrap()
     }
 
     #[test]

@@ -10,7 +10,7 @@
 use crate::likelihood::solve::Prior;
 use crate::locate::dependence::{Dependence, DependenceGrid, DependenceLaw};
 use crate::locate::table_form::{MotionPoint, Place, TableForm};
-use crate::locate::table_regression::{Rest, Table, squares};
+use crate::locate::table_regression::{LeftOut, Rest, Table, squares};
 use crate::locate::variable_classes::Classes;
 use crate::log::track::Track;
 use crate::model::hypothesis::Hypothesis;
@@ -179,28 +179,32 @@ impl Rest {
             return found;
         }
         let mut taken: Vec<&Classes> = Vec::new();
-        let Some(plain) = self.regression(Vec::new()).left_out() else { return found };
+        let Some(LeftOut { left: plain, .. }) = self.regression(Vec::new()).left_out() else { return found };
         let whole = squares(&plain) - self.noise;
         let mut before = plain;
         while found.len() < wanted.most && whole > self.noise {
             let with = |law| taken.iter().copied().chain(std::iter::once(law)).collect::<Vec<&Classes>>();
             let open = self.variables.iter().filter(|v| taken.iter().all(|t| t.form != v.form));
-            let tried: Vec<(&Classes, Vec<f64>)> =
+            let tried: Vec<(&Classes, LeftOut)> =
                 open.filter_map(|law| Some((law, self.regression(with(law)).left_out()?))).collect();
             let best = |of_two: bool| {
                 let of = tried.iter().filter(|(law, _)| law.form.second.is_some() == of_two);
-                of.min_by(|(_, a), (_, b)| squares(a).total_cmp(&squares(b)))
+                of.min_by(|(_, a), (_, b)| squares(&a.left).total_cmp(&squares(&b.left)))
             };
-            let share = |before: &[f64], left: &[f64]| (squares(before) - squares(left)) / whole;
-            let counts = |before: &[f64], left: &[f64]| {
-                share(before, left) >= TABLE_EXPLAINED_SHARE && self.certainty(before, left) >= CERTAIN_TABLE
+            let less = |before: &[f64], left: &[f64]| squares(before) - squares(left);
+            let counts = |before: &[f64], left: &[f64], whole: f64| {
+                less(before, left) >= TABLE_EXPLAINED_SHARE * whole
+                    && self.certainty(before, left) >= CERTAIN_TABLE
             };
-            let one = best(false).filter(|(_, left)| counts(&before, left));
-            // A table over two variables has to predict more than the best one over one.
-            let two = best(true).filter(|(_, left)| counts(one.map_or(&before, |(_, left)| left), left));
-            let Some((law, left)) = two.or(one) else { break };
-            let Some(table) = self.regression(with(law)).last_table() else { break };
-            let share = share(&before, left).min(1.0);
+            let one = best(false).filter(|(_, found)| counts(&before, &found.left, whole));
+            let two = best(true).filter(|(_, found)| {
+                // A table over two variables has to predict a good part of what the best one over one leaves.
+                let better = |one: &LeftOut| counts(&one.left, &found.left, squares(&one.left) - self.noise);
+                counts(&before, &found.left, whole) && one.is_none_or(|(_, one)| better(one))
+            });
+            let Some((law, LeftOut { priors, left })) = two.or(one) else { break };
+            let Some(table) = self.regression(with(law)).last_table(priors.stiffness) else { break };
+            let share = (less(&before, left) / whole).min(1.0);
             let Some(entry) = self.entry(law.form, table, share, (joint, wanted.rotary)) else { break };
             found.push(entry);
             taken.push(law);
@@ -237,7 +241,8 @@ impl Rest {
         let alone = |variable| {
             let classes = self.variables.iter().find(|v| v.form == TableForm::over(variable))?;
             let regression = self.regression(vec![classes]);
-            Some((squares(&regression.left_out()?), regression.last_table()?))
+            let LeftOut { priors, left } = regression.left_out()?;
+            Some((squares(&left), regression.last_table(priors.stiffness)?))
         };
         let (one, two) = (alone(form.variable)?, alone(second)?);
         let (form, over_first, table) = if two.0 < one.0 {
@@ -384,6 +389,7 @@ mod tests {
         assert!(on(1).variable == "q1" && on(1).grid.is_none(), "{found:?}");
         let grid = on(2).grid.as_ref().expect("two variables");
         assert_eq!((on(2).variable.as_str(), grid.variable.as_str()), ("q2", "dq1"));
+        assert!(on(2).share > 0.8, "{}", on(2).share);
         let (mut missed, mut all) = (0.0, 0.0);
         for (x, row) in grid.x.iter().zip(&grid.torque) {
             for (y, torque) in grid.y.iter().zip(row) {
@@ -398,6 +404,21 @@ mod tests {
     fn a_drift_is_a_law_of_time() {
         let found = found_in(&logs(0.5, |_, x| [0.1 * x.t, 0.0]));
         assert_eq!((found[0].joint, found[0].variable.as_str()), (1, "t"));
+    }
+
+    /// Fitted beside a drift, parameters have taken up a part of it: their errors, several standard deviations large, must neither hide the drift nor
+    /// become laws.
+    #[test]
+    fn a_drift_is_told_from_the_errors_it_made_in_the_parameters() {
+        let arm = TwoLink { gravity: 9.81, length1: 0.3 };
+        let found = found_in(&logs(0.5, |_, x| {
+            let [q, dq, ddq] = x.motion;
+            let off = -0.05 * arm.regressor(&q, &dq, &ddq).column(0);
+            [0.1 * x.t + off[0], off[1]]
+        }));
+        let listed: Vec<_> = found.iter().map(|d| (d.joint, d.variable.as_str())).collect();
+        assert_eq!(listed, [(1, "t")], "{found:?}");
+        assert!(found[0].share > 0.7, "{}", found[0].share);
     }
 
     #[test]

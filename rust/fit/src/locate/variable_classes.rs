@@ -8,9 +8,9 @@ use crate::numeric::low_pass::LowPass;
 /// seconds.
 pub const CLASSES: usize = 16;
 
-/// Number of classes of each of two variables: a torque with one period over the travel of either is resolved, and each cell holds some fifty samples
-/// of a log of ten seconds.
-const SIDE: usize = 7;
+/// Number of classes of each of two variables: a torque with a period and a half over the travel of either is resolved. Many cells hold no sample of a log
+/// of ten seconds and take their values from those around them.
+const SIDE: usize = 10;
 
 /// A variable of the motion cut into classes of equal count, at whose means hat functions have their peaks, or two variables with the products of
 /// their hat functions.
