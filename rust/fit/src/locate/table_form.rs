@@ -99,6 +99,20 @@ impl TableForm {
         pairs.into_iter().map(|[a, b]| Self { second: Some(b), ..Self::over(a) }).collect()
     }
 
+    /// Whether the table is one over an acceleration or a command, which answer to the torque that the table stands for.
+    pub fn answers_to_torque(self) -> bool {
+        let answers = |variable| {
+            matches!(
+                variable,
+                MotionVariable::Acceleration(_)
+                    | MotionVariable::Torque(_)
+                    | MotionVariable::Load(_)
+                    | MotionVariable::Stop(..)
+            )
+        };
+        matches!(self.factor, Factor::Torque(_)) || answers(self.variable) || self.second.is_some_and(answers)
+    }
+
     /// Factor and variables at every point of a log; the direction is smoothed below the speeds `slow`, rad/s or m/s.
     pub fn along<const N: usize>(self, points: &[MotionPoint<N>], slow: &[f64; N]) -> Vec<Place> {
         let factor = |x: &MotionPoint<N>| match self.factor {

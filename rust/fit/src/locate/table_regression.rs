@@ -36,6 +36,9 @@ pub struct Priors {
 }
 
 impl Priors {
+    /// Those of a residual torque of which nothing is explained.
+    const FULL: Self = Self { left: 1.0, stiffness: 1.0, zero: 1.0 };
+
     /// Priors that are tried.
     fn all() -> impl Iterator<Item = Self> {
         let with = |left| STIFFNESSES.map(|stiffness| ZEROS.map(|zero| Self { left, stiffness, zero }));
@@ -254,7 +257,8 @@ impl Regression<'_> {
     }
 
     /// What the regression leaves of logs that it was not fitted to, with the priors with which it leaves least, of those no weaker than what is left asks
-    /// for: with free parameters a gain of the command would explain everything. `None` if every fit is singular.
+    /// for. Accelerations and commands answer to every torque, whatever it depends on, and beside free parameters they would explain all of it: tables
+    /// over these keep the full priors. `None` if every fit is singular.
     pub fn left_out(&self) -> Option<LeftOut> {
         let others: Vec<NormalEquations> =
             (0..self.rest.logs()).map(|log| self.unpenalised(|other| other != log)).collect();
@@ -271,6 +275,9 @@ impl Regression<'_> {
             let left: Vec<f64> = rows.iter().enumerate().map(left).collect();
             (priors.left >= 1.0 || squares(&left) < priors.left * whole).then_some(LeftOut { priors, left })
         };
+        if self.laws.iter().any(|law| law.form.answers_to_torque()) {
+            return with(Priors::FULL);
+        }
         Priors::all().filter_map(with).min_by(|a, b| squares(&a.left).total_cmp(&squares(&b.left)))
     }
 
