@@ -131,6 +131,19 @@ impl TableForm {
 mod tests {
     use super::*;
 
+    #[test]
+    fn accelerations_and_commands_answer_to_every_torque_and_positions_do_not() {
+        use MotionVariable::{Acceleration, Load, Position, Stop, Time, Torque, Velocity};
+        let over = TableForm::over;
+        let answering = [Acceleration(0), Torque(0), Load(0), Stop(0, 0.1)].map(over);
+        assert!(answering.iter().all(|form| form.answers_to_torque()));
+        assert!(TableForm::times(Factor::Torque(0), Time).answers_to_torque());
+        assert!(TableForm { second: Some(Torque(0)), ..over(Position(0)) }.answers_to_torque());
+        let others = [Position(0), Velocity(0), Time].map(over);
+        assert!(!others.iter().any(|form| form.answers_to_torque()));
+        assert!(!TableForm { second: Some(Velocity(1)), ..over(Position(0)) }.answers_to_torque());
+    }
+
     fn points() -> Vec<MotionPoint<1>> {
         let point = |k: u8| {
             let t = 0.1 * f64::from(k);
