@@ -431,6 +431,42 @@ mod tests {
         }
     }
 
+    /// Priors chosen for a table over `variable`, of which the residual torque of three logs is the `size`-fold beside noise.
+    fn chosen(variable: MotionVariable, size: f64) -> Priors {
+        let mut random = Random(7);
+        let nodes: Vec<f64> = (0..7).map(|k| f64::from(k) / 3.0 - 1.0).collect();
+        let mut rest = Rest { away: vec![0.0], teaches: vec![true; 3], ..Rest::default() };
+        let mut share = Vec::new();
+        for k in 0..1200_u32 {
+            let x = (0.37 * f64::from(k)).sin();
+            let mut shares = vec![0.0; nodes.len()];
+            for (i, value) in hats(&nodes, x) {
+                shares[i] += value;
+            }
+            share.push(shares);
+            rest.torque.push(size * (3.0 * x).sin() + 0.1 * random.normal());
+            rest.base.push(vec![random.normal(), 1.0]);
+            rest.log.push(usize::try_from(k / 400).unwrap());
+            rest.block.push(usize::try_from(k / 60).unwrap());
+        }
+        let form = TableForm::over(variable);
+        let classes = Classes { form, nodes: [nodes, vec![]], share, factor_square: 1.0 };
+        rest.regression(vec![&classes]).left_out().unwrap().priors
+    }
+
+    #[test]
+    fn priors_are_as_weak_as_what_is_left_asks_for_and_no_weaker() {
+        let [strong, noise] = [1.0, 0.0].map(|size| chosen(MotionVariable::Position(0), size));
+        assert!(strong.left < 1.0 && noise.left >= 1.0, "{strong:?} {noise:?}");
+        assert!(strong.zero < noise.zero, "{strong:?} {noise:?}");
+    }
+
+    #[test]
+    fn tables_over_what_answers_to_the_torque_keep_the_full_priors() {
+        let priors = chosen(MotionVariable::Acceleration(0), 1.0);
+        assert_eq!((priors.left, priors.stiffness, priors.zero), (1.0, 1.0, 1.0));
+    }
+
     #[test]
     fn a_table_with_its_variables_exchanged_has_the_same_cells() {
         let table = Table {
