@@ -23,6 +23,8 @@ pub enum MotionVariable {
     /// Stop operator of a joint's commanded torque with this radius, N m or N: it follows changes of the torque within plus and minus the radius. It
     /// is the elementary hysteresis of Prandtl and Ishlinskii: the difference between a torque and what a play passes on.
     Stop(usize, f64),
+    /// Torque on a joint of the cause in whose place the table stands, N m or N.
+    Cause(usize),
 }
 
 impl MotionVariable {
@@ -42,6 +44,7 @@ impl MotionVariable {
             Self::Time => "t".to_owned(),
             Self::Load(i) => format!("|tau{}|", i + 1),
             Self::Stop(i, radius) => format!("stop of tau{} within {radius:.3}", i + 1),
+            Self::Cause(i) => format!("torque of the cause on joint {}", i + 1),
         }
     }
 
@@ -53,7 +56,8 @@ impl MotionVariable {
             | Self::Acceleration(i)
             | Self::Torque(i)
             | Self::Load(i)
-            | Self::Stop(i, _) => Some(i),
+            | Self::Stop(i, _)
+            | Self::Cause(i) => Some(i),
             Self::Time => None,
         }
     }
@@ -64,7 +68,7 @@ impl MotionVariable {
             Self::Position(_) => ["rad", "m"],
             Self::Velocity(_) => ["rad/s", "m/s"],
             Self::Acceleration(_) => ["rad/s^2", "m/s^2"],
-            Self::Torque(_) | Self::Load(_) | Self::Stop(..) => ["N m", "N"],
+            Self::Torque(_) | Self::Load(_) | Self::Stop(..) | Self::Cause(_) => ["N m", "N"],
             Self::Time => ["s", "s"],
         };
         if rotary { rotary_unit } else { linear_unit }
@@ -80,6 +84,7 @@ impl MotionVariable {
             Self::Torque(i) => each(&|x| x.tau[i]),
             Self::Time => each(&|x| x.t),
             Self::Load(i) => each(&|x| x.tau[i].abs()),
+            Self::Cause(i) => each(&|x| x.cause[i]),
             Self::Stop(i, radius) => {
                 let mut before = points.first().map_or(0.0, |x| x.tau[i]);
                 let follow = |stop: &mut f64, x: &MotionPoint<N>| {

@@ -2,6 +2,7 @@
 //!
 //! * `dependence`: a torque as a table over one or two variables of the motion.
 //! * `energy`: energy balance of the residual torque.
+//! * `log_residual`: residual torque of a log, and the torque of a cause as the difference of two.
 //! * `regimes`: residual torque in windows, by regime.
 //! * `table_form`: what a table's variables and factor are.
 //! * `table_regression`: tables fitted beside the arm's parameters, and what they predict.
@@ -10,6 +11,7 @@
 
 pub mod dependence;
 pub mod energy;
+pub mod log_residual;
 pub mod regimes;
 pub mod table_form;
 pub mod table_regression;

@@ -18,6 +18,8 @@ pub enum Factor {
     Torque(usize),
     /// Velocity of a joint, rad/s or m/s: the table is a viscous friction.
     Velocity(usize),
+    /// Torque on a joint of the cause in whose place the table stands, N m or N: the table is the cause's size relative to the fitted one.
+    Cause(usize),
 }
 
 /// Form of a torque as a table.
@@ -40,6 +42,8 @@ pub struct MotionPoint<const N: usize> {
     pub motion: [SVector<f64, N>; 3],
     /// Commanded torque, N m or N.
     pub tau: SVector<f64, N>,
+    /// Torque of the cause in whose place a table stands, N m or N; zero where there is none.
+    pub cause: SVector<f64, N>,
 }
 
 /// Where along a log a table is looked up.
@@ -88,6 +92,16 @@ impl TableForm {
         forms
     }
 
+    /// Forms of the tables on joint `own` (from 0) of `n` that take the form of a named cause further: a size of the cause that varies with a position, a
+    /// velocity, the joint's load or time (varying coefficients: Hastie and Tibshirani, J. R. Stat. Soc. B 55, 1993), and a torque over the cause's own.
+    /// The true form of a torque has a constant size.
+    pub fn varied(n: usize, own: usize) -> Vec<Self> {
+        let states = (0..n).flat_map(|j| [MotionVariable::Position(j), MotionVariable::Velocity(j)]);
+        let variables = states.chain([MotionVariable::Load(own), MotionVariable::Time]);
+        let sizes = variables.map(|variable| Self::times(Factor::Cause(own), variable));
+        sizes.chain([Self::over(MotionVariable::Cause(own))]).collect()
+    }
+
     /// Forms of the tables over two variables on joint `own` (from 0) of `n`: positions and velocities of all joints, each with each, and the joint's own
     /// commanded torque with its own position or velocity. Products of these, and laws multiplied by the size or the sign of a speed, are among them.
     pub fn over_two(n: usize, own: usize) -> Vec<Self> {
@@ -120,6 +134,7 @@ impl TableForm {
             Factor::Direction(j) => (x.motion[1][j] / slow[j]).tanh(),
             Factor::Torque(j) => x.tau[j],
             Factor::Velocity(j) => x.motion[1][j],
+            Factor::Cause(j) => x.cause[j],
         };
         let second = self.second.map_or_else(|| vec![0.0; points.len()], |second| second.along(points));
         let variables = self.variable.along(points).into_iter().zip(second);
@@ -148,7 +163,7 @@ mod tests {
         let point = |k: u8| {
             let t = 0.1 * f64::from(k);
             let motion = [t.sin(), t.cos(), -t.sin()].map(|x| SVector::from([x]));
-            MotionPoint { t, motion, tau: SVector::from([(3.0 * t).sin()]) }
+            MotionPoint { t, motion, tau: SVector::from([(3.0 * t).sin()]), cause: SVector::from([t.sin()]) }
         };
         (0..60).map(point).collect()
     }
@@ -165,6 +180,10 @@ mod tests {
             assert_eq!(
                 along(Factor::Velocity(0), MotionVariable::Time)[k],
                 Place { factor: x.motion[1][0], x: x.t, y: 0.0 }
+            );
+            assert_eq!(
+                along(Factor::Cause(0), MotionVariable::Cause(0))[k],
+                Place { factor: x.cause[0], x: x.cause[0], y: 0.0 }
             );
             assert_eq!(
                 along(Factor::Torque(0), MotionVariable::Position(0))[k],
@@ -210,5 +229,7 @@ mod tests {
         assert_eq!(rivals[..listed.len()], listed[..]);
         assert!((1..rivals.len()).all(|i| !rivals[..i].contains(&rivals[i])));
         assert!(listed.iter().all(|form| form.factor == Factor::One));
+        let all = [rivals, TableForm::varied(2, 1)].concat();
+        assert!((1..all.len()).all(|i| !all[..i].contains(&all[i])));
     }
 }

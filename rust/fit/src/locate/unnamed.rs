@@ -9,15 +9,12 @@
 
 use crate::likelihood::solve::Prior;
 use crate::locate::dependence::{Dependence, DependenceGrid, DependenceLaw};
-use crate::locate::table_form::{MotionPoint, Place, TableForm};
+use crate::locate::log_residual::LogResidual;
+use crate::locate::table_form::TableForm;
 use crate::locate::table_regression::{LeftOut, Rest, Table, squares};
 use crate::locate::variable_classes::Classes;
-use crate::log::track::Track;
-use crate::model::hypothesis::Hypothesis;
 use crate::numeric::low_pass::LowPass;
-use crate::predict::residual_torque::{
-    InverseDynamicsResidual, half_width, inverse_dynamics_residuals, rms, rms_speeds, slow_speeds,
-};
+use crate::predict::residual_torque::{InverseDynamicsResidual, rms};
 use armgap_core::arm::Arm;
 use nalgebra::{SMatrix, SVector};
 
@@ -47,55 +44,6 @@ pub const MAX_TABLES: usize = 3;
 
 /// Least number of blocks of one second in all logs for tables to be fitted.
 const FEWEST_BLOCKS: usize = 6;
-
-/// Residual torque of one log under a model by inverse dynamics, sample by sample.
-pub struct LogResidual<const N: usize> {
-    /// Samples of the log except a few at either end.
-    pub samples: Vec<InverseDynamicsResidual<N>>,
-    /// Median sample period of the log, s.
-    period: f64,
-    /// Standard deviation of the position measurement per joint, rad or m.
-    noise: [f64; N],
-    /// Speeds below which a joint may be at rest, rad/s or m/s.
-    slow: [f64; N],
-    /// Whether the torques of the tables are fitted to this log; all logs serve to judge which tables there are.
-    teaches: bool,
-}
-
-impl<const N: usize> LogResidual<N> {
-    /// Residual torque of a log under a model; `None` where the model cannot be simulated.
-    pub fn new<A: Arm<f64, N, P>, const P: usize>(
-        arm: &A,
-        track: &Track<N>,
-        model: &Hypothesis<P>,
-        teaches: bool,
-    ) -> Option<Self> {
-        let slow = slow_speeds(track, &rms_speeds(track));
-        let slowest = slow.iter().copied().fold(f64::INFINITY, f64::min);
-        let half = half_width(track);
-        let samples = inverse_dynamics_residuals(arm, track, model, &track.pushes, half, slowest)?;
-        (samples.len() > 2).then(|| Self {
-            samples,
-            period: track.period(),
-            noise: track.noise,
-            slow,
-            teaches,
-        })
-    }
-
-    fn times(&self) -> Vec<f64> {
-        self.samples.iter().map(|x| x.t - self.samples[0].t).collect()
-    }
-
-    /// Factor and variables of a form at every sample.
-    pub fn along(&self, form: TableForm) -> Vec<Place> {
-        let first = self.samples[0].t;
-        let point =
-            |x: &InverseDynamicsResidual<N>| MotionPoint { t: x.t - first, motion: x.motion, tau: x.tau };
-        let points: Vec<MotionPoint<N>> = self.samples.iter().map(point).collect();
-        form.along(&points, &self.slow)
-    }
-}
 
 /// Options of the search for dependences of the residual torque.
 #[derive(Clone, Copy)]
@@ -337,7 +285,8 @@ mod tests {
                     x
                 })
                 .collect();
-            LogResidual { samples, period: 0.005, noise: [0.0; 2], slow: [0.05; 2], teaches: true }
+            let (noise, slow, cause) = ([0.0; 2], [0.05; 2], Vec::new());
+            LogResidual { samples, period: 0.005, noise, slow, teaches: true, cause }
         };
         (0..3).map(|number| log(number, &mut random)).collect()
     }
@@ -427,6 +376,34 @@ mod tests {
             [if number == 1 { (3.0 * x.motion[0][0]).sin() } else { 0.0 }, 0.0]
         }));
         assert!(found.iter().all(|d| d.variable != "q1"), "{found:?}");
+    }
+
+    #[test]
+    fn a_size_of_the_cause_that_varies_is_a_table_times_the_cause_and_a_constant_one_is_flat() {
+        let cause = |x: &InverseDynamicsResidual<2>| (3.0 * x.motion[0][0]).sin();
+        let forms = |torques: &[f64], own: usize| {
+            let rivals = TableForm::rivals(torques, own).into_iter();
+            rivals.chain(TableForm::over_two(2, own)).chain(TableForm::varied(2, own)).collect()
+        };
+        let first = |size: &dyn Fn(f64) -> f64| {
+            let mut logs = logs(0.5, |_, x| [size(x.motion[0][1]) * cause(x), 0.0]);
+            for log in &mut logs {
+                log.cause = log.samples.iter().map(|x| SVector::from([cause(x), 0.0])).collect();
+            }
+            found_among(&forms, &logs).swap_remove(0)
+        };
+        let size = |q2: f64| 1.0 + 0.8 * q2;
+        let varying = first(&size);
+        assert_eq!(varying.form, TableForm::times(Factor::Cause(0), MotionVariable::Position(1)));
+        for (q2, torque) in varying.law.x.iter().zip(&varying.law.torque) {
+            assert!((torque + varying.law.constant[0] - size(*q2)).abs() < 0.1, "{varying:?}");
+        }
+        let constant = first(&|_| 1.0);
+        let flat = |torque: &f64| torque.abs() < 0.1;
+        assert!(
+            constant.form.factor != Factor::Cause(0) || constant.law.torque.iter().all(flat),
+            "{constant:?}"
+        );
     }
 
     #[test]

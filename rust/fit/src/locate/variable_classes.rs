@@ -1,7 +1,7 @@
 //! Basis of a table: hat functions of a variable of the motion, or products of those of two, and their means over the time around a point.
 
+use crate::locate::log_residual::LogResidual;
 use crate::locate::table_form::{Place, TableForm};
-use crate::locate::unnamed::LogResidual;
 use crate::numeric::low_pass::LowPass;
 
 /// Number of classes of a variable: a torque with two periods over the travel is resolved, and each class holds some hundred samples of a log of ten

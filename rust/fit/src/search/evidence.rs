@@ -137,8 +137,9 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
                     // The other effects in the model keep the parameters plausible without this cause: only predicted motion can be evidence for it.
                     cause.ground = Ground::Motion;
                 }
-                let rival =
-                    (!judged_in_training).then(|| self.rival_cost(&taken_out, &last.weights)).flatten();
+                let effect = &model.hypothesis.effects[place];
+                let rival = || self.rival_cost(&taken_out, effect, &last.weights);
+                let rival = (!judged_in_training).then(rival).flatten();
                 cause.evidence.rival_gain = rival.map(|rival| (bare - rival) / rest);
             }
             if let Some((ratio, sigma)) = size_ratio(place, model, on_holdout) {

@@ -60,6 +60,7 @@ fn along<const N: usize>(log: &Intervals<N>, form: TableForm) -> Vec<[f64; 2]> {
         t: m.t,
         motion: [m.q, m.dq, m.ddq].map(SVector::from),
         tau: SVector::from(m.tau),
+        cause: SVector::zeros(),
     };
     let points: Vec<MotionPoint<N>> = log.middles.iter().map(point).collect();
     form.along(&points, &log.slow).into_iter().map(|place| [place.factor, place.x]).collect()
