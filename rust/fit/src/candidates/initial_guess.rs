@@ -30,7 +30,8 @@ const IMITATED: f64 = 1e-4;
 const TRACE: f64 = 0.01;
 
 /// Least part of the training cost above the noise floor that a candidate must remove to first order to be fitted where the gap is of no consequence:
-/// only an effect that explains most of such a gap would be named.
+/// only an effect that explains most of such a gap would be named. For effects with a threshold `TRACE` counts there too: a play or a shaft far from its
+/// initial guesses removes a tenth of the gap at the guesses and all of it once fitted.
 const TRACE_IN_SMALL: f64 = 0.2;
 
 /// Number of initial guesses of an effect with a threshold on one joint, the best by traces of an earlier node, that are simulated again.
@@ -64,9 +65,11 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let gap = size > min_relevance;
         let training: f64 = self.problem(&weights.training).window_costs(&fit.hypothesis).iter().sum();
         let least = match size {
-            _ if !gap => f64::INFINITY,
-            _ if size < CONSEQUENTIAL_ERROR => TRACE_IN_SMALL * self.above_floor(training, weights),
-            _ => TRACE * training,
+            _ if !gap => [f64::INFINITY; 2],
+            _ if size < CONSEQUENTIAL_ERROR => {
+                [TRACE_IN_SMALL * self.above_floor(training, weights), TRACE * training]
+            }
+            _ => [TRACE * training; 2],
         };
         let promising = promising(&screening.tests, least);
         let more = promising.iter().map(|found| {
@@ -256,17 +259,20 @@ fn best_of_places(tests: &[ScoreTest], of: &[bool]) -> Vec<usize> {
     best
 }
 
-/// Best initial guesses of the candidates to be fitted: those with the largest gains in the score test, above `least`, and those that the arm's
-/// parameters imitate but for a share of `ABSORBED`, which only the prior of the parameters can distinguish from a change of them.
-fn promising(screened: &[ScoreTest], least: f64) -> Vec<&ScoreTest> {
+/// Best initial guesses of the candidates to be fitted: those with the largest gains in the score test, above `least` or, for an effect with a threshold,
+/// `least_of_whole`, and those that the arm's parameters imitate but for a share of `ABSORBED`, which only the prior of the parameters can distinguish
+/// from a change of them.
+fn promising(screened: &[ScoreTest], [least, least_of_whole]: [f64; 2]) -> Vec<&ScoreTest> {
     let mut order: Vec<&ScoreTest> = screened.iter().filter(|s| s.gain > 0.0).collect();
     order.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     let mut chosen: Vec<&ScoreTest> = Vec::new();
     for scored in order {
-        let wanted = (chosen.len() < FULL_FITS && scored.gain > least) || scored.distinct < ABSORBED;
+        let whole = scored.effect.law.spec().trial == Trial::Whole;
+        let gains = scored.gain > if whole { least_of_whole } else { least };
+        let wanted = (chosen.len() < FULL_FITS && gains) || scored.distinct < ABSORBED;
         // A score test at a trial value says little about the best initial guess, so two initial guesses are taken; so are two peaks of a
         // periodogram.
-        let several = scored.effect.law.spec().trial == Trial::Whole || scored.effect.is_periodic();
+        let several = whole || scored.effect.is_periodic();
         let initial_guesses = if several { 2 } else { 1 };
         if wanted && chosen.iter().filter(|c| c.effect.same_place(&scored.effect)).count() < initial_guesses {
             chosen.push(scored);
@@ -281,7 +287,11 @@ mod tests {
     use armgap_core::effect::find;
 
     fn test_of(joint: usize, gain: f64) -> ScoreTest {
-        let law = find::<f64>("joint_elasticity").expect("known");
+        test_by("joint_elasticity", joint, gain)
+    }
+
+    fn test_by(name: &str, joint: usize, gain: f64) -> ScoreTest {
+        let law = find::<f64>(name).expect("known");
         ScoreTest {
             effect: EffectInstance::new(law, joint, [0.0; 3]),
             gain,
@@ -294,6 +304,18 @@ mod tests {
             tested: 0,
             distinct: 0.0,
         }
+    }
+
+    #[test]
+    fn an_effect_with_a_threshold_is_fitted_for_less_than_one_whose_test_is_exact_to_first_order() {
+        let tests = [("backlash", 5.0), ("stribeck", 5.0), ("torque_offset", 15.0), ("contact", 1.5)];
+        let tests = tests.map(|(name, gain)| ScoreTest { distinct: 1.0, ..test_by(name, 0, gain) });
+        let names = |least: [f64; 2]| -> Vec<&str> {
+            promising(&tests, least).iter().map(|test| test.effect.law.spec().name).collect()
+        };
+        assert_eq!(names([10.0, 2.0]), ["torque_offset", "backlash"]);
+        assert_eq!(names([2.0, 2.0]), ["torque_offset", "backlash", "stribeck"]);
+        assert!(names([f64::INFINITY; 2]).is_empty());
     }
 
     #[test]
