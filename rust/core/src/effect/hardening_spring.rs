@@ -29,10 +29,6 @@ impl<T: Real> Effect<T> for HardeningSpring {
         &SPEC
     }
 
-    fn simpler(&self) -> Option<&'static str> {
-        Some("joint_spring")
-    }
-
     fn force(&self, p: &[T; MAX_PARAMETERS], x: &JointPoint<T>) -> T {
         let x = x.q - p[2];
         -(p[1] + p[0] * x * x) * x

@@ -243,12 +243,6 @@ pub trait Effect<T: Real>: Sync {
     /// Name, parameters, hooks and further description of the effect.
     fn spec(&self) -> &'static Spec;
 
-    /// Name of the effect that is left when the first parameter is zero, if there is one; that effect has the further parameters, under the same
-    /// names.
-    fn simpler(&self) -> Option<&'static str> {
-        None
-    }
-
     /// Parameters at which the effect changes the motion by about `share`, 0 to 1, of its whole change at `p`; `p` where these are not known.
     fn at_share(&self, p: &[T; MAX_PARAMETERS], _share: T) -> [T; MAX_PARAMETERS] {
         *p

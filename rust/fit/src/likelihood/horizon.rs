@@ -94,14 +94,8 @@ mod tests {
         let bias = HorizonBias { model: model.clone(), by_value };
         let matrix = DMatrix::from_diagonal_element(4, 4, 0.16);
         let covariance = ParameterCovariance { matrix, degrees_of_freedom: vec![9.0; 4] };
-        let mut fit = Fit {
-            hypothesis: model,
-            data_cost: 0.0,
-            prior_cost: 0.0,
-            covariance,
-            costs: Vec::new(),
-            own_jacobian: true,
-        };
+        let mut fit =
+            Fit { hypothesis: model, data_cost: 0.0, prior_cost: 0.0, covariance, costs: Vec::new() };
         bias.widen(&mut fit);
         for (i, sigma) in [0.5, 0.4, 0.32_f64.sqrt(), 0.4].into_iter().enumerate() {
             assert!((fit.sigma(i) - sigma).abs() < 1e-12, "{i}: {}", fit.sigma(i));

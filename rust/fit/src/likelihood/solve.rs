@@ -102,8 +102,6 @@ pub struct Fit<const P: usize> {
     pub covariance: ParameterCovariance,
     /// Cost of every window without its robust weight.
     pub costs: Vec<f64>,
-    /// Whether the last Jacobian was computed at the fitted point, without reused columns.
-    pub own_jacobian: bool,
 }
 
 impl<const P: usize> Fit<P> {
@@ -307,14 +305,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> FitProblem<'_, A, N, P> 
         self.progress.unit();
         let covariance = self.covariance(&jacobian.gram, &at);
         let Linearisation { hypothesis, data_cost, prior_cost, costs, .. } = at;
-        Fit {
-            hypothesis,
-            data_cost,
-            prior_cost,
-            covariance,
-            costs,
-            own_jacobian: jacobian.reused_columns() == 0,
-        }
+        Fit { hypothesis, data_cost, prior_cost, covariance, costs }
     }
 
     /// Cost at a hypothesis after a first-order re-estimate of its free values, with the Jacobian of a neighbouring hypothesis; infinite where it

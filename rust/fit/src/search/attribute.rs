@@ -5,13 +5,12 @@ use crate::candidates::traces::Traces;
 use crate::likelihood::context::{DiagnosisContext, SplitWeighting};
 use crate::likelihood::holdout::{CONSEQUENTIAL_ERROR, is_plausible};
 use crate::likelihood::jacobian::Sensitivities;
-use crate::likelihood::scale::Scales;
 use crate::likelihood::solve::{Effort, Fit};
 use crate::model::hypothesis::{EffectInstance, Hypothesis};
 use crate::progress::Phase;
 use crate::search::acceptance::{ABOVE_FLOOR, UNEXPLAINED};
 use armgap_core::arm::Arm;
-use armgap_core::effect::{MAX_PARAMETERS, Trial, catalogue, find};
+use armgap_core::effect::Trial;
 use armgap_core::transmission::Sides;
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -23,9 +22,6 @@ const OTHER_SIDES: usize = 2;
 /// Number of candidates of lowest cost that are fitted again under window weights made from the best candidate's residual.
 const FINALISTS: usize = 4;
 
-/// Number of candidates of lowest cost that are fitted with their own Jacobian before the finalists (fitted to the end) are chosen.
-const TAKEN_ON: usize = 2 * FINALISTS;
-
 /// Largest number of rounds in which the finalists (candidates of lowest cost) are fitted under window weights made from the best candidate's
 /// residual.
 const MAX_REWEIGHTINGS: usize = 3;
@@ -33,16 +29,8 @@ const MAX_REWEIGHTINGS: usize = 3;
 /// Ratio of the residual's scale (standard deviation) in the window weights to that under the best candidate, up to which the weights are kept.
 const SHRUNK: f64 = 1.15;
 
-/// Largest difference between a candidate's prior cost (squared distance of the parameters from the arm file's values, in sigmas) and the lowest one
-/// at which the candidate is fitted to the end for its prior cost.
-const TRUSTED: f64 = 10.0;
-
 /// Size of an effect, relative to the largest size that a fit allows, below which the effect has vanished.
 const IDLE: f64 = 2e-5;
-
-/// Initial guess, relative to its typical size, of the parameter that an effect has beyond those of its simplest case (a hardening spring beyond a
-/// linear one).
-const LITTLE: f64 = 0.1;
 
 /// An alternative to the current model, fitted on the training windows and judged on the holdout.
 #[derive(Debug, Clone)]
@@ -211,7 +199,6 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let jacobian = screening.as_ref().map(|screening| &screening.jacobian);
         self.progress.begin(Phase::Candidates, initial_guesses.len());
         let first = self.fit_candidates(&weights, &fit.hypothesis, initial_guesses, Effort::ROUGH, jacobian);
-        let first = self.taken_on(&weights, &fit.hypothesis, first);
         let field = self.field(&weights, &fit, &first);
         self.progress.begin(Phase::Finalists, 2 * FINALISTS + MAX_REWEIGHTINGS);
         let final_round = self.final_round(&fit.hypothesis, first, &weights);
@@ -223,7 +210,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let floor = self.floor(&weights);
         let motion = self.motion(&weights);
         let settled = fit;
-        self.duel(SearchNode { settled, base, candidates, field, screened, traces, weights, floor, motion })
+        SearchNode { settled, base, candidates, field, screened, traces, weights, floor, motion }
     }
 
     /// Deviation of an effect's first parameter from its neutral value, relative to the largest deviation that a fit allows.
@@ -260,22 +247,6 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let fitted =
             |initial_guess: Hypothesis<P>| self.candidate(weights, &initial_guess, known, effort, jacobian);
         ranked(initial_guesses.into_par_iter().map(fitted).collect())
-    }
-
-    /// The candidates in order of cost, after the best `TAKEN_ON` are fitted again with their own Jacobian if their first fit reused columns of the
-    /// Jacobian of the model `base`.
-    fn taken_on(
-        &self,
-        weights: &SplitWeighting<N>,
-        base: &Hypothesis<P>,
-        candidates: Vec<Candidate<P>>,
-    ) -> Vec<Candidate<P>> {
-        let known = base.effects.len();
-        let on = |(i, c): (usize, Candidate<P>)| {
-            let done = c.fit.own_jacobian || i >= TAKEN_ON;
-            if done { c } else { self.candidate(weights, &c.fit.hypothesis, known, Effort::ROUGH, None) }
-        };
-        ranked(candidates.into_par_iter().enumerate().map(on).collect())
     }
 
     /// Candidate fitted from an initial guess to the training windows and judged on the holdout; the effect under test follows the first `known`
@@ -319,8 +290,6 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             let weights = heavier.as_ref().unwrap_or(given);
             let last = shrunk <= SHRUNK || round == MAX_REWEIGHTINGS;
             let mut initial_guesses = finalists(&candidates, hopeless);
-            initial_guesses.extend(candidates.first().and_then(|best| simpler(current, best)));
-            initial_guesses.extend(candidates.first().and_then(|best| richer(current, best, &self.scales)));
             if last {
                 initial_guesses
                     .extend(candidates.first().into_iter().flat_map(|c| self.other_sides(c, weights)));
@@ -381,63 +350,8 @@ fn ranked<const P: usize>(mut candidates: Vec<Candidate<P>>) -> Vec<Candidate<P>
     best
 }
 
-/// Hypotheses to be fitted to the end: those of the candidates of lowest cost, if below the cost `hopeless`, and those of the candidates of lowest
-/// prior cost.
+/// Hypotheses to be fitted to the end: those of the candidates of lowest cost, the first in any case and the others if below the cost `hopeless`.
 fn finalists<const P: usize>(candidates: &[Candidate<P>], hopeless: f64) -> Vec<Hypothesis<P>> {
-    let mut by_trust: Vec<usize> = (0..candidates.len()).collect();
-    let prior = |i: &usize| candidates[*i].fit.prior_cost;
-    by_trust.sort_by(|a, b| prior(a).total_cmp(&prior(b)));
-    by_trust.truncate(FINALISTS / 2);
-    let least = candidates.iter().map(|c| c.fit.prior_cost).fold(f64::INFINITY, f64::min);
-    by_trust.retain(|i| candidates[*i].fit.prior_cost < least + TRUSTED);
-    let kept = candidates.iter().enumerate();
-    kept.filter(|(i, c)| (*i < FINALISTS && c.score() < hopeless) || *i == 0 || by_trust.contains(i))
-        .map(|(_, c)| c.fit.hypothesis.clone())
-        .collect()
-}
-
-/// The model with effect `law` added, at the candidate's values of the arm's parameters; none if the model has this effect already.
-fn with_law<const P: usize>(
-    model: &Hypothesis<P>,
-    candidate: &Candidate<P>,
-    law: EffectInstance,
-) -> Option<Hypothesis<P>> {
-    let taken = |e: &EffectInstance| e.law.spec().name == law.law.spec().name && e.joint == law.joint;
-    let theta = candidate.fit.hypothesis.theta;
-    (!model.effects.iter().any(taken)).then(|| Hypothesis { theta, ..model.with(law) })
-}
-
-/// The model with the simpler effect that a candidate's effect becomes when its first parameter vanishes (a linear spring for a hardening one); none
-/// if there is no simpler one.
-fn simpler<const P: usize>(model: &Hypothesis<P>, candidate: &Candidate<P>) -> Option<Hypothesis<P>> {
-    let effect = candidate.effect?;
-    let law = find::<f64>(effect.law.simpler()?)?;
-    let value =
-        |name: &str| effect.law.spec().parameters.iter().position(|p| p.name == name).map(|i| effect.p[i]);
-    let mut p = [0.0; MAX_PARAMETERS];
-    for (slot, parameter) in p.iter_mut().zip(law.spec().parameters) {
-        *slot = value(parameter.name)?;
-    }
-    with_law(model, candidate, EffectInstance::new(law, effect.joint, p))
-}
-
-/// The model with the effect of which a candidate's effect is the simplest case (a hardening spring for a linear one), at a small value of the
-/// additional parameter; none if there is no such effect.
-fn richer<const N: usize, const P: usize>(
-    model: &Hypothesis<P>,
-    candidate: &Candidate<P>,
-    scales: &Scales<N>,
-) -> Option<Hypothesis<P>> {
-    let effect = candidate.effect?;
-    let name = effect.law.spec().name;
-    let law = *catalogue::<f64>().iter().find(|law| law.simpler() == Some(name))?;
-    let known = |wanted: &str| effect.law.spec().parameters.iter().position(|p| p.name == wanted);
-    let mut p = [0.0; MAX_PARAMETERS];
-    for (slot, parameter) in p.iter_mut().zip(law.spec().parameters) {
-        *slot = match known(parameter.name) {
-            Some(i) => effect.p[i],
-            None => LITTLE * scales.size(parameter.quantity, effect.joint),
-        };
-    }
-    with_law(model, candidate, EffectInstance::new(law, effect.joint, p))
+    let best = candidates.iter().take(FINALISTS).enumerate();
+    best.filter(|(i, c)| *i == 0 || c.score() < hopeless).map(|(_, c)| c.fit.hypothesis.clone()).collect()
 }

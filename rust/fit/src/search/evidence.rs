@@ -8,7 +8,7 @@
 
 use crate::likelihood::context::DiagnosisContext;
 use crate::likelihood::holdout::is_plausible;
-use crate::likelihood::solve::{Fit, neutral};
+use crate::likelihood::solve::{Effort, Fit, neutral};
 use crate::model::hypothesis::EffectInstance;
 use crate::search::acceptance::{ABOVE_FLOOR, Ground, UNEXPLAINED};
 use crate::search::attribute::SearchNode;
@@ -127,7 +127,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             if let Some(rest) = rest {
                 let mut taken_out = model.hypothesis.clone();
                 taken_out.effects.remove(place);
-                let refitted = || self.fit_with_any_rounding(&taken_out, &last.weights);
+                let refitted = || self.problem(&last.weights.training).solve(&taken_out, Effort::FULL);
                 let without = reduced.get(place).cloned().unwrap_or_else(refitted);
                 let rises = differences(&per_window(&without), &per_window(model));
                 let bare = full + rises.iter().sum::<f64>();

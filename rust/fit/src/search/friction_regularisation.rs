@@ -2,8 +2,7 @@
 //!
 //! Dry friction jumps at standstill; the friction of many simulators, and of joints that creep, follows `tanh(dq / width)`, on every joint with a
 //! width of its own. The widths are never named as a cause, but a model with wrong widths mispredicts every reversal, and this error hides small
-//! causes, or is attributed to an effect that acts at reversals too. So the model with the best widths is a rival of every candidate, and of every
-//! cause that is to stay.
+//! causes, or is attributed to an effect that acts at reversals too. So the model with the best widths is a rival of every candidate.
 
 use crate::likelihood::context::{DiagnosisContext, SplitWeighting};
 use crate::likelihood::jacobian::Sensitivities;
@@ -156,20 +155,6 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let regularised = self.with_best_widths(&self.problem(&weights.training), model, jacobian);
         let exact = model.is_rounded().then(|| model.rounded_over([0.0; N]));
         regularised.into_iter().chain(exact).collect()
-    }
-
-    /// The better fit of a model to the training windows: with its own widths of friction regularisation or with those of lowest cost. A model with a
-    /// further cause is compared with this fit.
-    pub(crate) fn fit_with_any_rounding(&self, model: &Hypothesis<P>, weights: &SplitWeighting<N>) -> Fit<P> {
-        let problem = self.problem(&weights.training);
-        let fit = problem.solve(model, Effort::FULL);
-        let jacobian = problem.jacobian(&fit.hypothesis);
-        let Some(regularised) = self.with_best_widths(&problem, &fit.hypothesis, &jacobian) else {
-            return fit;
-        };
-        let other = problem.solve(&regularised, Effort::FULL);
-        let cost = |fit: &Fit<P>| fit.data_cost + fit.prior_cost;
-        if cost(&other) < cost(&fit) { other } else { fit }
     }
 
     /// Fit of the current model with friction regularised over the best widths; none if this does not explain most of the gap.

@@ -232,7 +232,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             let full = self.judged(node, model.clone(), None);
             let mut without = model.hypothesis.clone();
             without.effects.remove(i);
-            let fit = self.fit_with_any_rounding(&without, &node.weights);
+            let fit = self.problem(&node.weights.training).solve(&without, Effort::FULL);
             let reduced = self.judged(node, fit, None);
             let idle = full.z_over(&reduced) < CERTAIN
                 && !node.takes_outliers(&full, &reduced)
