@@ -355,3 +355,68 @@ fn finalists<const P: usize>(candidates: &[Candidate<P>], hopeless: f64) -> Vec<
     let best = candidates.iter().take(FINALISTS).enumerate();
     best.filter(|(i, c)| *i == 0 || c.score() < hopeless).map(|(_, c)| c.fit.hypothesis.clone()).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::likelihood::covariance::ParameterCovariance;
+    use armgap_core::effect::find;
+    use nalgebra::DMatrix;
+
+    /// Candidate for an effect of the library on the first joint, of a size relative to the largest, with costs of training and holdout windows.
+    fn candidate(effect: &str, size: f64, training: &[f64], holdout: &[f64]) -> Candidate<4> {
+        let law = find::<f64>(effect).expect("in the catalogue");
+        let effect = EffectInstance::new(law, 0, [size, 1.0, 1.0]);
+        let covariance =
+            ParameterCovariance { matrix: DMatrix::zeros(4, 4), degrees_of_freedom: vec![9.0; 4] };
+        let hypothesis = Hypothesis::rigid([1.0; 4]).with(effect);
+        let fit = Fit { hypothesis, data_cost: 0.0, prior_cost: 2.0, covariance, costs: Vec::new() };
+        let (training, holdout) = (training.to_vec(), holdout.to_vec());
+        Candidate { effect: Some(effect), size, fit, training, holdout, error: 1.0 }
+    }
+
+    fn names(models: &[Hypothesis<4>]) -> Vec<&'static str> {
+        models.iter().map(|model| model.effects[0].law.spec().name).collect()
+    }
+
+    #[test]
+    fn candidates_are_ranked_by_cost_and_those_that_diverged_or_vanished_are_left_out() {
+        let all = [
+            candidate("torque_gain", 0.5, &[3.0], &[4.0]),
+            candidate("stribeck", 0.5, &[2.0], &[1.0]),
+            candidate("torque_gain", 0.4, &[1.0], &[3.0]),
+            candidate("torque_offset", 0.5, &[f64::INFINITY], &[1.0]),
+            candidate("backlash", 0.5 * IDLE, &[0.0], &[0.0]),
+            candidate("quadratic_drag", 0.5 * IDLE, &[4.0], &[4.0]),
+        ];
+        let found: Vec<(&str, f64)> = ranked(all.to_vec())
+            .iter()
+            .map(|c| (c.effect.expect("an effect").law.spec().name, c.score()))
+            .collect();
+        assert_eq!(found, [("stribeck", 5.0), ("torque_gain", 6.0), ("quadratic_drag", 10.0)]);
+    }
+
+    #[test]
+    fn finalists_are_the_best_and_others_that_are_not_hopeless() {
+        let costs = [("stribeck", 1.0), ("torque_gain", 2.0), ("torque_offset", 3.0)];
+        let further = [("quadratic_drag", 4.0), ("cubic_drag", 5.0)];
+        let all: Vec<Candidate<4>> =
+            costs.iter().chain(&further).map(|(name, cost)| candidate(name, 0.5, &[*cost], &[0.0])).collect();
+        let first_four = ["stribeck", "torque_gain", "torque_offset", "quadratic_drag"];
+        assert_eq!(names(&finalists(&all, f64::INFINITY)), first_four);
+        // Scores are the costs and a prior cost of 2.
+        assert_eq!(names(&finalists(&all, 4.5)), first_four[..2]);
+        assert_eq!(names(&finalists(&all, 0.0)), first_four[..1]);
+    }
+
+    #[test]
+    fn a_decrease_counts_in_standard_errors_of_its_mean_on_all_windows_or_on_the_holdout() {
+        let base = candidate("stribeck", 0.5, &[5.0, 5.0], &[5.0, 7.0]);
+        let better = candidate("stribeck", 0.5, &[4.0, 4.0], &[2.0, 6.0]);
+        assert_eq!(better.advantages(&base), [1.0, 1.0, 3.0, 1.0]);
+        // Mean 1.5, standard error sqrt(1 / 4); on the holdout mean 2, standard error sqrt(2 / 2).
+        assert!((better.z_over(&base) - 3.0).abs() < 1e-12);
+        assert!((better.holdout_z_over(&base) - 2.0).abs() < 1e-12);
+        assert!((base.z_over(&better) + 3.0).abs() < 1e-12);
+    }
+}
