@@ -22,6 +22,10 @@ const OTHER_SIDES: usize = 2;
 /// Number of candidates of lowest cost that are fitted again under window weights made from the best candidate's residual.
 const FINALISTS: usize = 4;
 
+/// Largest difference between a candidate's prior cost (squared distance of the parameters from the arm file's values, in sigmas) and the lowest one
+/// at which the candidate is fitted to the end for its prior cost.
+const TRUSTED: f64 = 10.0;
+
 /// Largest number of rounds in which the finalists (candidates of lowest cost) are fitted under window weights made from the best candidate's
 /// residual.
 const MAX_REWEIGHTINGS: usize = 3;
@@ -350,10 +354,19 @@ fn ranked<const P: usize>(mut candidates: Vec<Candidate<P>>) -> Vec<Candidate<P>
     best
 }
 
-/// Hypotheses to be fitted to the end: those of the candidates of lowest cost, the first in any case and the others if below the cost `hopeless`.
+/// Hypotheses to be fitted to the end: those of the candidates of lowest cost, the first in any case and the others if below the cost `hopeless`, and
+/// those of the candidates of lowest prior cost.
 fn finalists<const P: usize>(candidates: &[Candidate<P>], hopeless: f64) -> Vec<Hypothesis<P>> {
-    let best = candidates.iter().take(FINALISTS).enumerate();
-    best.filter(|(i, c)| *i == 0 || c.score() < hopeless).map(|(_, c)| c.fit.hypothesis.clone()).collect()
+    let prior = |c: &Candidate<P>| c.fit.prior_cost;
+    let least = candidates.iter().map(prior).fold(f64::INFINITY, f64::min);
+    let mut by_trust: Vec<usize> = (0..candidates.len()).collect();
+    by_trust.sort_by(|a, b| prior(&candidates[*a]).total_cmp(&prior(&candidates[*b])));
+    by_trust.truncate(FINALISTS / 2);
+    by_trust.retain(|i| prior(&candidates[*i]) < least + TRUSTED);
+    let kept = candidates.iter().enumerate();
+    kept.filter(|(i, c)| *i == 0 || (*i < FINALISTS && c.score() < hopeless) || by_trust.contains(i))
+        .map(|(_, c)| c.fit.hypothesis.clone())
+        .collect()
 }
 
 #[cfg(test)]
@@ -397,16 +410,23 @@ mod tests {
     }
 
     #[test]
-    fn finalists_are_the_best_and_others_that_are_not_hopeless() {
+    fn finalists_are_the_best_that_are_not_hopeless_and_those_nearest_to_the_arm_file() {
         let costs = [("stribeck", 1.0), ("torque_gain", 2.0), ("torque_offset", 3.0)];
         let further = [("quadratic_drag", 4.0), ("cubic_drag", 5.0)];
-        let all: Vec<Candidate<4>> =
+        let mut all: Vec<Candidate<4>> =
             costs.iter().chain(&further).map(|(name, cost)| candidate(name, 0.5, &[*cost], &[0.0])).collect();
+        for (candidate, prior) in all.iter_mut().zip([2.0, 2.0, 4.0, 6.0, 8.0]) {
+            candidate.fit.prior_cost = prior;
+        }
         let first_four = ["stribeck", "torque_gain", "torque_offset", "quadratic_drag"];
         assert_eq!(names(&finalists(&all, f64::INFINITY)), first_four);
-        // Scores are the costs and a prior cost of 2.
-        assert_eq!(names(&finalists(&all, 4.5)), first_four[..2]);
-        assert_eq!(names(&finalists(&all, 0.0)), first_four[..1]);
+        assert_eq!(names(&finalists(&all, 0.0)), first_four[..2], "the two of least prior cost");
+        all[1].fit.prior_cost = 2.0 + 1.1 * TRUSTED;
+        all[4].fit.prior_cost = 1.0;
+        assert_eq!(names(&finalists(&all, 0.0)), ["stribeck", "cubic_drag"]);
+        all[0].fit.prior_cost = 1.0 + 1.1 * TRUSTED;
+        all[2].fit.prior_cost = all[0].fit.prior_cost;
+        assert_eq!(names(&finalists(&all, 3.5)), ["stribeck", "quadratic_drag", "cubic_drag"]);
     }
 
     #[test]
