@@ -113,7 +113,9 @@ def test_backlash_that_only_the_training_log_passes_is_no_push(pendulum: Arm) ->
     training = swing(pendulum, 3, backlash, noise=2e-5)
     result = diagnose(training, pendulum, holdout=loaded_one_way(pendulum, 4, backlash))
     assert [(c.effect, c.joint) for c in result.causes] == [("backlash", 1)]
-    assert any("different gaps" in note for note in result.extra["notes"])
+    gap = result.causes[0].parameters["gap"]
+    assert gap.value == pytest.approx(0.01, abs=max(3 * gap.sigma, 3e-4))
+    assert gap.sigma < 1e-3
 
 
 @pytest.mark.slow
