@@ -37,7 +37,7 @@ const AT_FLOOR: f64 = 1.5;
 
 /// Mean difference of the windows' costs between the best candidate and another one, in standard errors of this mean, below which the other one is a
 /// close rival.
-const CLOSE: f64 = 3.0;
+pub const CLOSE: f64 = 3.0;
 
 /// Least decrease of the cost, summed over the windows that a candidate improves, for the candidate to explain outlying windows: in standard
 /// deviations of a typical window's cost where that cost is noise, in typical windows' costs elsewhere.

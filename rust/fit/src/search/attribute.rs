@@ -214,7 +214,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let floor = self.floor(&weights);
         let motion = self.motion(&weights);
         let settled = fit;
-        SearchNode { settled, base, candidates, field, screened, traces, weights, floor, motion }
+        self.duel(SearchNode { settled, base, candidates, field, screened, traces, weights, floor, motion })
     }
 
     /// Deviation of an effect's first parameter from its neutral value, relative to the largest deviation that a fit allows.
