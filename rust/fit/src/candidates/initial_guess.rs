@@ -30,8 +30,8 @@ const IMITATED: f64 = 1e-4;
 const TRACE: f64 = 0.01;
 
 /// Least part of the training cost above the noise floor that a candidate must remove to first order to be fitted where the gap is of no consequence:
-/// only an effect that explains most of such a gap would be named. For effects with a threshold `TRACE` counts there too: a play or a shaft far from its
-/// initial guesses removes a tenth of the gap at the guesses and all of it once fitted.
+/// only an effect that explains a large part of such a gap would be named. For effects with a threshold `TRACE` counts there too: at an initial guess far
+/// from the arm's play or shaft the test shows little of what the effect removes once fitted.
 const TRACE_IN_SMALL: f64 = 0.2;
 
 /// Number of initial guesses of an effect with a threshold on one joint, the best by traces of an earlier node, that are simulated again.
@@ -260,19 +260,19 @@ fn best_of_places(tests: &[ScoreTest], of: &[bool]) -> Vec<usize> {
 }
 
 /// Best initial guesses of the candidates to be fitted: those with the largest gains in the score test, above `least` or, for an effect with a threshold,
-/// `least_of_whole`, and those that the arm's parameters imitate but for a share of `ABSORBED`, which only the prior of the parameters can distinguish
+/// `least_with_threshold`, and those that the arm's parameters imitate but for a share of `ABSORBED`, which only the prior of the parameters can distinguish
 /// from a change of them.
-fn promising(screened: &[ScoreTest], [least, least_of_whole]: [f64; 2]) -> Vec<&ScoreTest> {
+fn promising(screened: &[ScoreTest], [least, least_with_threshold]: [f64; 2]) -> Vec<&ScoreTest> {
     let mut order: Vec<&ScoreTest> = screened.iter().filter(|s| s.gain > 0.0).collect();
     order.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     let mut chosen: Vec<&ScoreTest> = Vec::new();
     for scored in order {
-        let whole = scored.effect.law.spec().trial == Trial::Whole;
-        let gains = scored.gain > if whole { least_of_whole } else { least };
-        let wanted = (chosen.len() < FULL_FITS && gains) || scored.distinct < ABSORBED;
+        let has_threshold = scored.effect.law.spec().trial == Trial::Whole;
+        let is_promising = scored.gain > if has_threshold { least_with_threshold } else { least };
+        let wanted = (chosen.len() < FULL_FITS && is_promising) || scored.distinct < ABSORBED;
         // A score test at a trial value says little about the best initial guess, so two initial guesses are taken; so are two peaks of a
         // periodogram.
-        let several = whole || scored.effect.is_periodic();
+        let several = has_threshold || scored.effect.is_periodic();
         let initial_guesses = if several { 2 } else { 1 };
         if wanted && chosen.iter().filter(|c| c.effect.same_place(&scored.effect)).count() < initial_guesses {
             chosen.push(scored);

@@ -396,19 +396,29 @@ mod tests {
     use crate::locate::variable_classes::hats;
     use crate::numeric::random::Random;
 
+    /// Seven nodes from -1 to 1.
+    fn nodes() -> Vec<f64> {
+        (0..7).map(|k| f64::from(k) / 3.0 - 1.0).collect()
+    }
+
+    /// Hat functions of the nodes at `x`.
+    fn shares(nodes: &[f64], x: f64) -> Vec<f64> {
+        let mut shares = vec![0.0; nodes.len()];
+        for (i, value) in hats(nodes, x) {
+            shares[i] += value;
+        }
+        shares
+    }
+
     /// Table of the torque 2 `x` with noise, beside a parameter of whose standard deviation `x` is the torque, `away` from the arm file's value.
     fn table_beside_parameter(away: f64) -> Table {
         let mut random = Random(3);
-        let nodes: Vec<f64> = (0..7).map(|k| f64::from(k) / 3.0 - 1.0).collect();
+        let nodes = nodes();
         let mut rest = Rest { away: vec![away], teaches: vec![true], ..Rest::default() };
         let mut share = Vec::new();
         for k in 0..1200 {
             let x = (0.37 * f64::from(k)).sin();
-            let mut shares = vec![0.0; nodes.len()];
-            for (i, value) in hats(&nodes, x) {
-                shares[i] += value;
-            }
-            share.push(shares);
+            share.push(shares(&nodes, x));
             rest.torque.push(2.0 * x + 0.1 * random.normal());
             rest.base.push(vec![x, 1.0]);
             rest.log.push(0);
@@ -434,16 +444,12 @@ mod tests {
     /// Priors chosen for a table over `variable`, of which the residual torque of three logs is the `size`-fold beside noise.
     fn chosen(variable: MotionVariable, size: f64) -> Priors {
         let mut random = Random(7);
-        let nodes: Vec<f64> = (0..7).map(|k| f64::from(k) / 3.0 - 1.0).collect();
+        let nodes = nodes();
         let mut rest = Rest { away: vec![0.0], teaches: vec![true; 3], ..Rest::default() };
         let mut share = Vec::new();
         for k in 0..1200_u32 {
             let x = (0.37 * f64::from(k)).sin();
-            let mut shares = vec![0.0; nodes.len()];
-            for (i, value) in hats(&nodes, x) {
-                shares[i] += value;
-            }
-            share.push(shares);
+            share.push(shares(&nodes, x));
             rest.torque.push(size * (3.0 * x).sin() + 0.1 * random.normal());
             rest.base.push(vec![random.normal(), 1.0]);
             rest.log.push(usize::try_from(k / 400).unwrap());

@@ -24,8 +24,8 @@ const HOLDOUT_CERTAIN: f64 = 1.0;
 pub const MATTERS: f64 = 0.1;
 
 /// Share of the gap above the noise floor that a candidate must remove where the gap is of no consequence (RMS error relative to the motion below
-/// `CONSEQUENTIAL_ERROR`): only an effect that explains a large part of such a gap counts. At 0.5 three
-/// narrow plays are missed that have 0.58, 1.00 and 1.00 at 0.3; 69 other arms of the same simulator keep their names.
+/// `CONSEQUENTIAL_ERROR`): only an effect that explains a large part of such a gap counts. At 0.5 three narrow plays are missed that have 0.58, 1.00
+/// and 1.00 at 0.3; 69 other arms of the same simulator keep their names.
 const MATTERS_IN_SMALL: f64 = 0.3;
 
 /// Ratio of the holdout's cost to its noise floor (the cost that measurement noise alone leaves) up to which no gap is left to explain.
