@@ -2,6 +2,7 @@
 
 use crate::likelihood::context::{DiagnosisContext, SplitWeighting};
 use crate::likelihood::solve::Fit;
+use crate::model::hypothesis::Hypothesis;
 use armgap_core::arm::Arm;
 
 /// RMS prediction error, relative to the RMS motion within a window, below which a gap is of no consequence, at any resolution of the encoders.
@@ -14,8 +15,12 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     /// RMS prediction error of a fit on the holdout relative to the RMS motion within a window; the few windows with the largest costs are left out
     /// of the error.
     pub(crate) fn relative_gap(&self, weights: &SplitWeighting<N>, fit: &Fit<P>) -> f64 {
-        let costs = self.judge(&weights.holdout).raw_costs(&fit.hypothesis);
-        (without_worst(costs) / self.motion(weights)).sqrt()
+        (self.holdout_error(weights, &fit.hypothesis) / self.motion(weights)).sqrt()
+    }
+
+    /// Sum of the holdout windows' costs without robust weights under a model, the few largest left out.
+    pub(crate) fn holdout_error(&self, weights: &SplitWeighting<N>, model: &Hypothesis<P>) -> f64 {
+        without_worst(self.judge(&weights.holdout).raw_costs(model))
     }
 
     /// Student-t cost of every holdout window under a fit, and the sum of the windows' costs without robust weights, the few largest left out.

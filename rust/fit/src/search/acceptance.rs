@@ -1,7 +1,7 @@
 //! Acceptance criteria of a cause in the model search.
 //!
-//! A candidate effect is accepted as a cause if it removes a considerable share of the gap, on the holdout too, by more than the scatter between
-//! windows, or if fitted parameters that were implausible return to their prior values with it.
+//! A candidate effect is accepted as a cause if predictions improve with it, on the holdout too, by more than the scatter between windows, or if fitted
+//! parameters that were implausible return to their prior values with it.
 
 use crate::likelihood::holdout::CONSEQUENTIAL_ERROR;
 use crate::likelihood::holdout::is_plausible;
@@ -20,7 +20,8 @@ const CERTAIN_ENOUGH: f64 = 2.5;
 /// alone has fewer windows than all logs and must only agree with them.
 const HOLDOUT_CERTAIN: f64 = 1.0;
 
-/// Share of the gap above the noise floor that an effect must remove for its improvement to count.
+/// Share of the gap above the noise floor that a candidate must remove to be compared closely with others, and a table of torque to be listed. A cause
+/// of a gap of consequence needs no such share: where several effects are missing, the first that is added may remove little before the others are known.
 pub const MATTERS: f64 = 0.1;
 
 /// Share of the gap above the noise floor that a candidate must remove where the gap is of no consequence (RMS error relative to the motion below
@@ -213,15 +214,24 @@ pub enum Ground {
 /// Index of the candidate that is accepted as a cause at a search node, and the ground of its acceptance; none if no candidate is accepted. Friction
 /// regularisation (a candidate without an effect) may be accepted unless friction is `regularised` already.
 ///
+/// Of those that meet the criteria the one of lowest cost is accepted. A candidate of still lower cost that does not meet them is no ground to stop: on a
+/// real arm with two effects on one joint, a third effect that imitates both at once may fit best and predict the holdout no better than before.
+///
 /// RMS improvements of the predictions below `min_relevance`, relative to the motion within a window, do not count.
 pub fn choose<const N: usize, const P: usize>(
     node: &SearchNode<N, P>,
     regularised: bool,
     min_relevance: f64,
 ) -> Option<(usize, Ground)> {
-    let by_motion = best(node, regularised).filter(|i| moves(node, &node.candidates[*i], min_relevance));
-    if let Some(best) = by_motion {
-        return Some((simplest(node, best, regularised, min_relevance), Ground::Motion));
+    let offer = |candidate: &Candidate<P>| Offer {
+        advantage: node.base.score() - candidate.score(),
+        values: free_values(candidate, regularised),
+        share: node.share(candidate),
+        moves: (candidate.effect.is_some() || !regularised) && moves(node, candidate, min_relevance),
+    };
+    let offers: Vec<Offer> = node.candidates.iter().map(offer).collect();
+    if let Some(index) = accepted(&offers) {
+        return Some((index, Ground::Motion));
     }
     let free = |i: usize| node.candidates[i].effect.as_ref().map_or(0, EffectInstance::len) as f64;
     let trust = |i: &usize| node.candidates[*i].fit.prior_cost + free(*i);
@@ -231,48 +241,31 @@ pub fn choose<const N: usize, const P: usize>(
         .map(|index| (index, Ground::Trust))
 }
 
-/// Index of the candidate of lowest cost, or, if its effect is idle or at its largest size, of the next one that lowers the cost almost as much and
-/// is neither; none if there is none. Friction regularisation (a candidate without an effect) is left out if friction is `regularised` already.
-pub fn best<const N: usize, const P: usize>(node: &SearchNode<N, P>, regularised: bool) -> Option<usize> {
-    let open = |i: &usize| node.candidates[*i].effect.is_some() || !regularised;
-    let first = (0..node.candidates.len()).find(open)?;
-    let advantage = |i: usize| node.base.score() - node.candidates[i].score();
-    let as_good = |i: &usize| open(i) && advantage(*i) >= ALMOST * advantage(first);
-    (first..node.candidates.len()).filter(as_good).find(|i| is_possible(&node.candidates[*i]))
-}
-
 /// Whether the fitted size of a candidate's effect is neither idle (near zero, for an effect with a threshold) nor the largest that the fit allows.
 pub fn is_possible<const P: usize>(candidate: &Candidate<P>) -> bool {
     candidate.size < AT_BOUND && !candidate.is_idle()
 }
 
-/// Index of the candidate with the fewest parameters among those that lower the cost almost as much as candidate `best`: a spring with a far-off rest
-/// position is a torque offset, and a hysteresis over a very short path is regularised friction.
-fn simplest<const N: usize, const P: usize>(
-    node: &SearchNode<N, P>,
-    best: usize,
-    regularised: bool,
-    min_relevance: f64,
-) -> usize {
-    let almost = if node.share(&node.candidates[best]) > MOST_OF_GAP { ALMOST } else { ALMOST_IN_DOUBT };
-    let offer = |candidate: &Candidate<P>| Offer {
-        advantage: node.base.score() - candidate.score(),
-        values: free_values(candidate, regularised),
-        moves: moves(node, candidate, min_relevance),
-    };
-    let offers: Vec<Offer> = node.candidates.iter().map(offer).collect();
-    fewest_values(&offers, best, almost)
-}
-
-/// Decrease of the cost, number of values and acceptance of one candidate, from which the simplest of several candidates is chosen.
+/// Figures of one candidate from which the one that is accepted is chosen.
 #[derive(Debug, Clone, Copy)]
 struct Offer {
     /// Decrease of the cost by the candidate.
     advantage: f64,
+    /// Share of the gap above the noise floor that the candidate removes on the holdout.
+    share: f64,
     /// Number of free values that the candidate adds to the arm's parameters; zero if the candidate is not to be chosen for its simplicity.
     values: usize,
     /// Whether the candidate by itself meets the acceptance criteria on predicted motion.
     moves: bool,
+}
+
+/// Index in `offers`, which are in order of cost, lowest first, of the one that is accepted: the first that meets the acceptance criteria, or one with
+/// fewer values that lowers the cost almost as much, since a spring with a far-off rest position is a torque offset, and a hysteresis over a very short
+/// path is regularised friction. None if no offer meets the criteria.
+fn accepted(offers: &[Offer]) -> Option<usize> {
+    let best = offers.iter().position(|offer| offer.moves)?;
+    let almost = if offers[best].share > MOST_OF_GAP { ALMOST } else { ALMOST_IN_DOUBT };
+    Some(fewest_values(offers, best, almost))
 }
 
 /// Index in `offers` of the candidate with the fewest values, the first of several, among those that are accepted by themselves and lower the cost by
@@ -294,8 +287,8 @@ fn free_values<const P: usize>(candidate: &Candidate<P>, regularised: bool) -> u
     candidate.effect.as_ref().map_or(width, EffectInstance::len)
 }
 
-/// Whether a candidate meets the acceptance criteria on predicted motion: it removes a considerable share of the gap, improves the RMS error by more
-/// than `min_relevance` (relative to the motion within a window), and is significant on all windows and on the holdout alone.
+/// Whether a candidate meets the acceptance criteria on predicted motion: it improves the RMS error by more than `min_relevance` (relative to the motion
+/// within a window), is significant on all windows and on the holdout alone, and removes a considerable share of a gap that is of no consequence.
 pub fn moves<const N: usize, const P: usize>(
     node: &SearchNode<N, P>,
     candidate: &Candidate<P>,
@@ -303,7 +296,7 @@ pub fn moves<const N: usize, const P: usize>(
 ) -> bool {
     let (matters, certain) = match node.relative_error() {
         _ if min_relevance <= FAINTEST => (MATTERS_IF_FAINT, CERTAIN_IF_FAINT),
-        error if error > CONSEQUENTIAL_ERROR => (MATTERS, CERTAIN),
+        error if error > CONSEQUENTIAL_ERROR => (0.0, CERTAIN),
         _ => (MATTERS_IN_SMALL, CERTAIN),
     };
     node.excess() > ABOVE_FLOOR
@@ -355,7 +348,18 @@ mod tests {
     use super::*;
 
     fn offer(advantage: f64, values: usize) -> Offer {
-        Offer { advantage, values, moves: true }
+        Offer { advantage, values, share: 0.6, moves: true }
+    }
+
+    #[test]
+    fn a_better_fit_that_the_holdout_does_not_confirm_is_no_ground_to_accept_none() {
+        let [elasticity, lag, inertia] = [offer(641.0, 3), offer(516.0, 1), offer(425.0, 1)];
+        let refused = |offer| Offer { moves: false, ..offer };
+        assert_eq!(accepted(&[refused(elasticity), lag, refused(inertia)]), Some(1));
+        assert_eq!(accepted(&[elasticity, lag, inertia]), Some(0));
+        assert_eq!(accepted(&[refused(elasticity), refused(lag), refused(inertia)]), None);
+        let small = |offer| Offer { share: 0.2, ..offer };
+        assert_eq!(accepted(&[small(elasticity), lag, inertia]), Some(1), "most of the gap stays");
     }
 
     #[test]

@@ -20,7 +20,8 @@ pub struct Cause {
     pub probability: f64,
     /// Share of the holdout's gap above the noise floor that the cause removed when it was added.
     pub share: f64,
-    /// RMS improvement of the predictions on the holdout by the cause when it was added, relative to the RMS motion within the windows.
+    /// RMS rise of the prediction errors on the holdout when the effect is taken out of the final model and nothing is fitted again, relative to the RMS
+    /// motion within the windows; during the search, their RMS improvement when the cause was added.
     pub relevance: f64,
     /// Effects that the logs of the diagnosis cannot distinguish from the cause.
     pub look_alikes: Vec<EffectInstance>,

@@ -100,7 +100,10 @@ impl Evidence {
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// Computes evidence and probability of all causes that a model search has found.
+    /// Computes strength, evidence and probability of all causes that a model search has found.
+    ///
+    /// The strength of a cause is what the predictions lose without it while everything else keeps its value. What the parameters and the other causes
+    /// could take over depends on the windows' length, and with it the order of causes that are about as strong.
     pub(crate) fn weigh(&self, attribution: &mut Attribution<N, P>) {
         let Some(last) = attribution.nodes.last() else { return };
         if attribution.causes.is_empty() {
@@ -119,14 +122,17 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             .or_else(|| above_noise(total(in_training(model)), rows * last.floor, UNEXPLAINED));
         let per_window = |fit: &Fit<P>| if judged_in_training { in_training(fit) } else { held_out(fit) };
         let full = total(per_window(model));
+        let error = self.holdout_error(&last.weights, &model.hypothesis);
         causes.par_iter_mut().for_each(|cause| {
             let Some(place) = model.hypothesis.effects.iter().position(|e| e.same_place(&cause.effect))
             else {
                 return;
             };
+            let mut taken_out = model.hypothesis.clone();
+            taken_out.effects.remove(place);
+            let rise = self.holdout_error(&last.weights, &taken_out) - error;
+            cause.relevance = (rise.max(0.0) / last.motion).sqrt();
             if let Some(rest) = rest {
-                let mut taken_out = model.hypothesis.clone();
-                taken_out.effects.remove(place);
                 let refitted = || self.problem(&last.weights.training).solve(&taken_out, Effort::FULL);
                 let without = reduced.get(place).cloned().unwrap_or_else(refitted);
                 let rises = differences(&per_window(&without), &per_window(model));

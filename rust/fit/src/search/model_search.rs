@@ -257,7 +257,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     }
 }
 
-/// Updates the values and standard deviations of causes from the final model, and sorts the causes by relevance.
+/// Updates the values and standard deviations of causes from the final model, and sorts the causes by relevance, strongest first.
 pub(crate) fn refresh<const P: usize>(model: &Fit<P>, causes: &mut [Cause]) {
     for cause in causes.iter_mut() {
         let mut first = P;
