@@ -24,7 +24,7 @@ const HOLDOUT_CERTAIN: f64 = 1.0;
 pub const MATTERS: f64 = 0.1;
 
 /// Share of a gap of consequence above the noise floor that a cause must remove. Where several effects are missing, the first that is added may remove
-/// little before the others are known: at 0.1 a real arm's rotor inertia is refused at eight standard errors. At 0 a ripple of a twentieth of that arm's
+/// little before the others are known: at 0.1 a real arm's rotor inertia is refused at seven standard errors. At 0 a ripple of a twentieth of that arm's
 /// gap is named at one of five horizons; 72 simulated arms keep all their names at 0 and 0.05.
 const LEAST_SHARE: f64 = 0.05;
 
