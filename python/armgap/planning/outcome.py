@@ -13,7 +13,7 @@ __all__ = ["Outcome", "certainty", "settled"]
 Array = NDArray[np.float64]
 
 #: Thresholds of a diagnosis: cost of a gap over the floor's, part of the excess that an effect removes, and standard errors of the
-#: windows' mean advantage (`rust/fit/src/search/acceptance.rs`).
+#: windows' mean advantage, for an effect of three values (`rust/fit/src/search/acceptance.rs`): what decides for it decides for simpler ones.
 ABOVE_FLOOR, MATTERS, CERTAIN = 1.25, 0.1, 3.5
 #: Standard errors of the windows' mean advantage that a diagnosis needs on the holdout alone.
 HELD_CERTAIN = 1.0

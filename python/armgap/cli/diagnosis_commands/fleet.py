@@ -52,7 +52,7 @@ _DRIFTS = 10
 @click.option("--again", is_flag=True, help="Diagnose also what stands in the folder.")
 @quiet_option
 def command(manifest: str, folder: Path, engine: str, quiet: bool, **options: Any) -> None:
-    """Diagnose every entry of a manifest: who has what, what drifts, which robot is the odd one.
+    """Diagnose every entry of a manifest: causes by robot, values that drift over time, robots unlike the others.
 
     The MANIFEST is CSV, Parquet or TOML with the columns robot, arm, logs, holdout, time; several logs are separated by ;.
     A run that was interrupted goes on where it stopped.

@@ -20,7 +20,7 @@ pub struct LogResidual<const N: usize> {
     /// Speeds below which a joint may be at rest, rad/s or m/s.
     pub(super) slow: [f64; N],
     /// Whether the torques of the tables are fitted to this log; all logs serve to judge which tables there are.
-    pub(super) teaches: bool,
+    pub(super) in_training: bool,
     /// Torque at every sample of the cause in whose place a table stands, N m or N; empty where there is none.
     pub(super) cause: Vec<SVector<f64, N>>,
 }
@@ -31,7 +31,7 @@ impl<const N: usize> LogResidual<N> {
         arm: &A,
         track: &Track<N>,
         model: &Hypothesis<P>,
-        teaches: bool,
+        in_training: bool,
     ) -> Option<Self> {
         let slow = slow_speeds(track, &rms_speeds(track));
         let slowest = slow.iter().copied().fold(f64::INFINITY, f64::min);
@@ -42,7 +42,7 @@ impl<const N: usize> LogResidual<N> {
             period: track.period(),
             noise: track.noise,
             slow,
-            teaches,
+            in_training,
             cause: Vec::new(),
         })
     }
@@ -97,7 +97,7 @@ mod tests {
         };
         let samples = residual.iter().enumerate().map(sample).collect();
         let (noise, slow, cause) = ([0.0], [0.1], Vec::new());
-        LogResidual { samples, period: 0.01, noise, slow, teaches: true, cause }
+        LogResidual { samples, period: 0.01, noise, slow, in_training: true, cause }
     }
 
     #[test]

@@ -72,7 +72,7 @@ pub struct Rest {
     /// Index of the log that each point belongs to.
     pub log: Vec<usize>,
     /// Whether the torques of the tables are fitted to each log.
-    pub teaches: Vec<bool>,
+    pub in_training: Vec<bool>,
     /// Index of the block of one second that each point belongs to, counted through all logs.
     pub block: Vec<usize>,
 }
@@ -116,7 +116,7 @@ impl Rest {
 
     /// Number of logs.
     pub fn logs(&self) -> usize {
-        self.teaches.len()
+        self.in_training.len()
     }
 
     /// Regression of the residual torque on the arm's parameters and on tables over the variables `laws`.
@@ -149,7 +149,7 @@ impl Rest {
 
     /// Indices of the points of the logs that tables are fitted to.
     fn taught(&self) -> impl Iterator<Item = usize> + '_ {
-        (0..self.torque.len()).filter(|i| self.teaches[self.log[*i]])
+        (0..self.torque.len()).filter(|i| self.in_training[self.log[*i]])
     }
 
     /// Mean square of the residual torque, N^2 m^2 or N^2.
@@ -281,12 +281,12 @@ impl Regression<'_> {
         Priors::all().filter_map(with).min_by(|a, b| squares(&a.left).total_cmp(&squares(&b.left)))
     }
 
-    /// Last table of the regression, fitted to the logs with `teaches`, beside parameters expected at the arm file's values. All prior precisions are
+    /// Last table of the regression, fitted to the training logs, beside parameters expected at the arm file's values. All prior precisions are
     /// those of a residual torque of which the tables explain nothing, times the share of its variance that they leave. What table and parameters can
     /// both take is shared as the arm file's standard deviations say.
     pub fn last_table(&self, stiffness: f64) -> Option<Table> {
         let held = self.precision(stiffness, ANCHORED);
-        let whole = self.unpenalised(|log| self.rest.teaches[log]);
+        let whole = self.unpenalised(|log| self.rest.in_training[log]);
         let blocks = self.blocks();
         let share = |fitted: &Fitted| (fitted.left / self.rest.variance()).min(1.0);
         let first = self.fitted(&whole, &blocks, &held)?;
@@ -328,7 +328,7 @@ impl Regression<'_> {
         })
     }
 
-    /// Normal equations of every block of the logs with `teaches`, and the indices of its points.
+    /// Normal equations of every block of the training logs, and the indices of its points.
     fn blocks(&self) -> Vec<Block> {
         let mut blocks: Vec<Block> = Vec::new();
         let mut last = None;
@@ -375,7 +375,7 @@ struct Block {
 
 /// Coefficients of a regression.
 struct Fitted {
-    /// Fitted to all logs that teach.
+    /// Fitted to all training logs.
     values: DVector<f64>,
     /// Fitted without each of their blocks.
     without: Vec<DVector<f64>>,
@@ -414,7 +414,7 @@ mod tests {
     fn table_beside_parameter(away: f64) -> Table {
         let mut random = Random(3);
         let nodes = nodes();
-        let mut rest = Rest { away: vec![away], teaches: vec![true], ..Rest::default() };
+        let mut rest = Rest { away: vec![away], in_training: vec![true], ..Rest::default() };
         let mut share = Vec::new();
         for k in 0..1200 {
             let x = (0.37 * f64::from(k)).sin();
@@ -445,7 +445,7 @@ mod tests {
     fn chosen(variable: MotionVariable, size: f64) -> Priors {
         let mut random = Random(7);
         let nodes = nodes();
-        let mut rest = Rest { away: vec![0.0], teaches: vec![true; 3], ..Rest::default() };
+        let mut rest = Rest { away: vec![0.0], in_training: vec![true; 3], ..Rest::default() };
         let mut share = Vec::new();
         for k in 0..1200_u32 {
             let x = (0.37 * f64::from(k)).sin();

@@ -112,7 +112,7 @@ impl Rest {
                 rest.torque.push(torque[*i]);
                 rest.base.push(columns.iter().map(|c| c[*i]).chain(std::iter::once(1.0)).collect());
             }
-            rest.teaches.push(log.teaches);
+            rest.in_training.push(log.in_training);
             kept.push(points);
         }
         let cut = |form| Classes::new(form, logs, &lows, &kept);
@@ -286,7 +286,7 @@ mod tests {
                 })
                 .collect();
             let (noise, slow, cause) = ([0.0; 2], [0.05; 2], Vec::new());
-            LogResidual { samples, period: 0.005, noise, slow, teaches: true, cause }
+            LogResidual { samples, period: 0.005, noise, slow, in_training: true, cause }
         };
         (0..3).map(|number| log(number, &mut random)).collect()
     }

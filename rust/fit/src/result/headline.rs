@@ -1,14 +1,16 @@
 //! Choice of the causes that a diagnosis names: probable enough, with values that arms can have and sizes distinct from zero, no more effects than
-//! allowed, and only where the model with them predicts no worse than the arm file. All others are listed as candidates, with reasons.
+//! allowed, and only where the model with them predicts no worse than the arm file and than the arm without causes. All others are listed as candidates, with reasons.
 //!
 //! The reported model has the named causes only, so that its gap is the one a reader gets who adds these causes to a simulation.
 
 use crate::disturbance::push::{Conclusion, Disturbance};
 use crate::likelihood::context::{DiagnosisContext, SplitWeighting};
+use crate::likelihood::encoder_zero::EncoderZeros;
 use crate::likelihood::horizon::HorizonBias;
 use crate::likelihood::solve::Fit;
 use crate::model::hypothesis::{EffectInstance, Hypothesis};
 use crate::numeric::products::rms;
+use crate::predict::window::Dataset;
 use crate::search::belief::Cause;
 use crate::search::model_search::{Attribution, refresh};
 use armgap_core::arm::Arm;
@@ -138,10 +140,12 @@ fn is_worse(found: &[f64], given: &[f64]) -> bool {
     found.iter().sum::<f64>() > given.iter().sum()
 }
 
-/// Makes all named causes candidates, because predictions with them are worse than those of the arm file.
-fn withhold(causes: &mut Vec<Cause>, candidates: &mut Vec<Unnamed<Cause>>) {
-    let why = "with the re-estimated parameters and the causes that were found, held-out motion is predicted worse than by the arm file as it stands";
-    let withheld = causes.drain(..).map(|found| Unnamed { found, why: why.to_owned() });
+/// Makes all named causes candidates, because predictions with them are worse than those of another model, given in words.
+fn withhold(causes: &mut Vec<Cause>, candidates: &mut Vec<Unnamed<Cause>>, than: &str) {
+    let why = format!(
+        "with the re-estimated parameters and the causes to be named, held-out motion is predicted worse than {than}"
+    );
+    let withheld = causes.drain(..).map(|found| Unnamed { found, why: why.clone() });
     candidates.splice(0..0, withheld);
 }
 
@@ -170,8 +174,10 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         self.set_pushes(&disturbances);
         changed |= !candidates.is_empty();
         let (mut model, mut weights, mut open) = self.reported(&attribution, &causes, &disturbances, changed);
-        if open && !causes.is_empty() && self.is_worse_than_the_arm_file(&model, &weights) {
-            withhold(&mut causes, &mut candidates);
+        let worse =
+            if open && !causes.is_empty() { self.worse(&attribution, &model, &weights) } else { None };
+        if let Some(than) = worse {
+            withhold(&mut causes, &mut candidates, than);
             (model, weights, open) = self.reported(&attribution, &causes, &disturbances, true);
         }
         refresh(&model, &mut causes);
@@ -210,17 +216,30 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         refit
     }
 
-    /// Whether a model, beside the encoder zeros of its weights, predicts the holdout worse than the arm file as it stands, which knows of no pushes.
-    fn is_worse_than_the_arm_file(&self, model: &Fit<P>, weights: &SplitWeighting<N>) -> bool {
+    /// Model without causes, in words, that predicts the holdout better than a `model` with the named causes, beside the encoder zeros of its `weights`:
+    /// the arm file as it stands, which knows of no pushes, or the arm with its parameters re-estimated, beside zeros of its own; none if neither does.
+    fn worse(
+        &self,
+        attribution: &Attribution<N, P>,
+        model: &Fit<P>,
+        weights: &SplitWeighting<N>,
+    ) -> Option<&'static str> {
         let (data, measured) = (&self.holdout.data, &self.holdout.measured);
+        let errors = |data: &Dataset<N>, hypothesis: &Hypothesis<P>, zeros: &EncoderZeros<N>| {
+            rms::<N>(measured, &data.predict(&self.arm, hypothesis, &zeros.offsets(data)))
+        };
+        let found = errors(data, &model.hypothesis, &weights.holdout.zeros);
         let arm_file = Hypothesis::rigid(self.prior.theta);
-        let given = data.without_pushes().predict(&self.arm, &arm_file, &data.zero_offsets());
-        let found = data.predict(&self.arm, &model.hypothesis, &weights.holdout.zeros.offsets(data));
-        is_worse(&rms::<N>(measured, &found), &rms::<N>(measured, &given))
+        if is_worse(&found, &errors(&data.without_pushes(), &arm_file, &EncoderZeros::none())) {
+            return Some("by the arm file as it stands");
+        }
+        let (refit, without) = self.settle(&attribution.refit.hypothesis, weights.training.scale);
+        let given = errors(data, &refit.hypothesis, &without.holdout.zeros);
+        is_worse(&found, &given).then_some("with the re-estimated parameters alone")
     }
 
-    /// Model with the named causes alone, its window weights, and whether its gap is open; `changed` says that some found cause or disturbance is not
-    /// named.
+    /// Fitted model with the named causes and disturbances alone, its window weights, and whether it leaves a gap open; that of the model search where
+    /// all that was found is named, else (`changed`) fitted again.
     fn reported(
         &self,
         attribution: &Attribution<N, P>,
@@ -304,7 +323,7 @@ mod tests {
         assert!(is_worse(&[0.5, 9.0], &[1.0, 2.0]) && !is_worse(&[0.5, 2.0], &[2.0, 1.0]));
         let (mut named, mut rest) =
             (vec![cause.clone()], vec![Unnamed { found: cause, why: "small".to_owned() }]);
-        withhold(&mut named, &mut rest);
+        withhold(&mut named, &mut rest, "by the arm file as it stands");
         assert!(named.is_empty() && rest.len() == 2 && rest[0].why.contains("worse than by the arm file"));
     }
 

@@ -8,7 +8,7 @@ use crate::likelihood::encoder_zero::EncoderZeros;
 use crate::likelihood::solve::{Effort, Fit};
 use crate::model::hypothesis::{EffectInstance, Hypothesis};
 use crate::search::acceptance::{
-    CERTAIN, CLEAR, FAINTEST, RELEVANT, TRUST_GAIN, UNEXPLAINED, choose, min_relevance,
+    CLEAR, FAINTEST, RELEVANT, TRUST_GAIN, UNEXPLAINED, certain, choose, min_relevance,
 };
 use crate::search::attribute::{Candidate, SearchNode};
 use crate::search::belief::{Cause, name};
@@ -234,7 +234,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             without.effects.remove(i);
             let fit = self.problem(&node.weights.training).solve(&without, Effort::FULL);
             let reduced = self.judged(node, fit, None);
-            let idle = full.z_over(&reduced) < CERTAIN
+            let idle = full.z_over(&reduced) < certain(Some(&model.hypothesis.effects[i]))
                 && !node.takes_outliers(&full, &reduced)
                 && reduced.fit.prior_cost - full.fit.prior_cost < TRUST_GAIN;
             if idle {

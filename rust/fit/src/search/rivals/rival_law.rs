@@ -49,19 +49,19 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
 
     /// Tables of a model's residual torque by inverse dynamics, strongest first, fitted to the training logs.
     fn dependences(&self, model: &Hypothesis<P>, wanted: Wanted<'_>) -> Vec<Dependence> {
-        let of = |set, teaches| self.residuals(set, model, teaches).into_iter().flatten();
+        let of = |set, in_training| self.residuals(set, model, in_training).into_iter().flatten();
         let logs: Vec<LogResidual<N>> = of(&self.training, true).chain(of(&self.holdout, false)).collect();
         dependences(&self.arm, &model.theta, &self.prior, &logs, wanted)
     }
 
-    /// Residual torque of a model in every log of a set of windows; tables are fitted to logs that teach.
+    /// Residual torque of a model in every log of a set of windows; tables are fitted to those `in_training`.
     fn residuals(
         &self,
         set: &WindowSet<N>,
         model: &Hypothesis<P>,
-        teaches: bool,
+        in_training: bool,
     ) -> Vec<Option<LogResidual<N>>> {
-        set.data.tracks.iter().map(|track| LogResidual::new(&self.arm, track, model, teaches)).collect()
+        set.data.tracks.iter().map(|track| LogResidual::new(&self.arm, track, model, in_training)).collect()
     }
 
     /// Least cost on the holdout of the model `without` a cause and with a table of torque added, on each joint the one that best predicts the model's
@@ -73,9 +73,12 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         weights: &SplitWeighting<N>,
     ) -> Option<f64> {
         let with = without.with(*cause);
-        let beside = |set, teaches| -> Vec<Option<LogResidual<N>>> {
-            let both =
-                self.residuals(set, without, teaches).into_iter().zip(self.residuals(set, &with, teaches));
+        let beside = |set, in_training| -> Vec<Option<LogResidual<N>>> {
+            let both = self.residuals(set, without, in_training).into_iter().zip(self.residuals(
+                set,
+                &with,
+                in_training,
+            ));
             both.map(|(rest, with)| Some(rest?.beside_cause(&with?))).collect()
         };
         let along = |set: &WindowSet<N>, logs: &[Option<LogResidual<N>>]| -> CauseTorques<N> {
