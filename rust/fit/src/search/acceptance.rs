@@ -14,8 +14,8 @@ use armgap_core::effect::{MAX_PARAMETERS, Quantity};
 pub const CERTAIN: f64 = 3.5;
 
 /// Decrease of `CERTAIN` with each value that an effect has less than three: with each value an effect has more forms, the best of which fits some part of
-/// what no effect explains. At 0 the rotor inertia of a real arm is accepted from 13 of 24 choices of its logs, else from 17; from 24 further choices it is from 10 either way. With 2.5 for all effects a
-/// ripple and a contact stand for a torque that depends on two positions together.
+/// what no effect explains. At 0 the rotor inertia of a real arm is accepted from 13 of 24 choices of its logs, else from 17; from 24 further choices it is
+/// from 10 either way. With 2.5 for all effects a ripple and a contact stand for a torque that depends on two positions together.
 const CERTAIN_PER_VALUE: f64 = 0.5;
 
 /// Least mean decrease of the holdout windows' cost by a candidate, in standard errors of this mean, for the candidate to be accepted: the holdout
