@@ -71,12 +71,12 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             return None;
         }
         let rival = self.better_rival(search, ended, seed)?;
-        if rival.better.is_none() {
+        let Some(better) = rival.better else {
             let mut simpler = self.swapped(search, &rival, min_relevance);
             self.pursue(&mut simpler, min_relevance, max_causes, seed);
             return Some(simpler);
-        }
-        let mut other = self.back_to(search, &rival, min_relevance, seed);
+        };
+        let mut other = self.back_to(search, &rival, better, min_relevance, seed);
         self.pursue(&mut other, min_relevance, max_causes, seed);
         let as_good = other.node.relative_error() < rival.allowed * search.node.relative_error();
         (as_good && self.needed(&other) <= self.needed(search)).then_some(other)
@@ -158,11 +158,13 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         simpler
     }
 
-    /// The search taken back to the node at which `rival` was not chosen, with the rival added in place of its cause.
+    /// The search taken back to the node at which `rival` was not chosen, with the rival added in place of its cause, than which it is
+    /// better with the probability `better`.
     fn back_to(
         &self,
         search: &ModelSearch<N, P>,
         rival: &Rival<P>,
+        better: f64,
         min_relevance: f64,
         seed: u64,
     ) -> ModelSearch<N, P> {
@@ -177,10 +179,9 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let known = |c: &&Cause| before.effects.iter().any(|e| e.same_place(&c.effect));
         let mut causes: Vec<Cause> = search.causes.iter().filter(known).cloned().collect();
         let named = name(&node, choice, Ground::Motion, seed);
-        let selected = rival.better.unwrap_or(named.probability);
         causes.push(Cause {
-            probability: selected,
-            evidence: Evidence { selected, ..named.evidence },
+            probability: better,
+            evidence: Evidence { selected: better, ..named.evidence },
             ..named
         });
         let next = node.candidates[choice].fit.clone();
