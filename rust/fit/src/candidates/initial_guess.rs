@@ -20,7 +20,7 @@ const FULL_FITS: usize = 18;
 
 /// Share of a candidate's squared sensitivity that the arm's own parameters cannot imitate, below which only the prior of the parameters can
 /// distinguish the candidate from a change of the parameters.
-const ABSORBED: f64 = 0.03;
+pub(crate) const ABSORBED: f64 = 0.03;
 
 /// Share of a candidate's squared sensitivity that the arm's own parameters cannot imitate, below which derivatives do not determine the candidate's
 /// size.

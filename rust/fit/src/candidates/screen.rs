@@ -3,6 +3,7 @@
 //! With `H` the inner products of the sensitivities of the free values (prior precision included) and `s` their products with the residual, a
 //! further parameter with sensitivity `c` reduces the cost by `(s_c - H_c H^-1 s)^2 / (H_cc - H_c H^-1 H_c')` (Rao 1948).
 
+use crate::candidates::pair_test::Projected;
 use crate::likelihood::jacobian::Sensitivities;
 use crate::likelihood::scale::Scales;
 use crate::likelihood::solve::{FitProblem, inverse_of_seen, neutral};
@@ -237,6 +238,22 @@ impl<'a, A: Arm<f64, N, P>, const N: usize, const P: usize> TestPoint<'a, A, N, 
         candidates.par_iter().zip(traces).enumerate().map(test).collect()
     }
 
+    /// Inner products of traces and of these with the residual, without what the model's free values imitate.
+    pub(crate) fn projected(&self, traces: &[Vec<f64>]) -> Projected {
+        let problem = self.problem;
+        let (k, count) = (self.jacobian.columns.len(), traces.len());
+        let columns: Vec<&[f64]> = self.jacobian.columns.iter().chain(traces).map(Vec::as_slice).collect();
+        let gram = problem.weighting.gram(problem.data, &columns, &self.residual);
+        let (own, own_score) = problem.normal_equations(&gram, k, self.base);
+        let inverse = inverse_of_seen(&own).unwrap_or_else(|| DMatrix::zeros(k, k));
+        let cross = gram.total.view((0, k), (k, count)).into_owned();
+        let imitated = cross.transpose() * &inverse;
+        Projected {
+            normal: gram.total.view((k, k), (count, count)) - &imitated * &cross,
+            gradient: gram.total.view((k, k + count), (count, 1)).column(0) - &imitated * &own_score,
+        }
+    }
+
     /// Student-t cost of a whitened residual, summed over the windows.
     fn student_t_total(&self, residual: &[f64]) -> f64 {
         let weighting = self.problem.weighting;
@@ -260,7 +277,7 @@ fn displaced(candidate: &EffectInstance) -> (EffectInstance, f64) {
 }
 
 /// Index of the parameter that the score test displaces: the first amplitude of the candidate whose trial value is not neutral.
-fn tested(candidate: &EffectInstance) -> usize {
+pub(crate) fn tested(candidate: &EffectInstance) -> usize {
     let off = neutral(candidate);
     (0..candidate.len()).find(|&i| candidate.p[i] != off.p[i]).unwrap_or(0)
 }

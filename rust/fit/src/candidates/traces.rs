@@ -44,6 +44,11 @@ impl<const N: usize> Traces<N> {
             && now.iter().zip(&self.transmissions).all(|(a, b)| a.same_place(b) && a.sides == b.sides)
     }
 
+    /// The candidates whose traces are kept.
+    pub(crate) fn candidates(&self) -> &[EffectInstance] {
+        &self.candidates
+    }
+
     /// The whitened trace of a candidate under residual scales `scale`, rad or m; `None` if the candidate is unknown at these values, or changed no
     /// prediction, as a contact that the arm did not reach.
     pub(crate) fn whitened(&self, candidate: &EffectInstance, scale: &[f64; N]) -> Option<Vec<f64>> {

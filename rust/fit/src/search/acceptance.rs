@@ -114,7 +114,7 @@ pub const ALMOST: f64 = 0.95;
 const ALMOST_IN_DOUBT: f64 = 0.6;
 
 /// Share of the gap above the noise floor that a candidate must remove to explain most of the gap.
-const MOST_OF_GAP: f64 = 0.5;
+pub const MOST_OF_GAP: f64 = 0.5;
 
 /// Difference between the costs of the best candidate and another one, relative to the decrease of the cost by the best one, below which the two are
 /// look-alikes, which the logs cannot distinguish, unless the best one leaves noise alone and the other significantly more.

@@ -81,23 +81,28 @@ impl<const P: usize> Candidate<P> {
         other.training.iter().chain(&other.holdout).zip(here).map(|(b, a)| b - a).collect()
     }
 
-    /// Mean decrease of the windows' cost from candidate `other` to this candidate, in units of the mean's standard error.
+    /// Mean decrease of the windows' cost from candidate `other` to this candidate, in units of the mean's standard error, as a normal deviate (`z_score`).
     pub fn z_over(&self, other: &Self) -> f64 {
         z_score(&self.advantages(other))
     }
 
-    /// Mean decrease of the holdout windows' cost from candidate `other` to this candidate, in units of the mean's standard error.
+    /// Mean decrease of the holdout windows' cost from candidate `other` to this candidate, in units of the mean's standard error, as a normal deviate.
     pub fn holdout_z_over(&self, other: &Self) -> f64 {
         z_score(&self.advantages(other)[self.training.len()..])
     }
 }
 
-/// Mean of `x` in units of its standard error.
+/// Mean of `x` in units of its standard error, as the normal deviate of equal probability. The ratio has Student's t distribution with one degree of
+/// freedom less than there are values, whose tails are heavier the fewer these are; its deviate by the approximation of Wallace (1959), Bounds on normal
+/// approximations to Student's and the chi-square distributions, Ann. Math. Statist. 30, 1121-1130.
 fn z_score(x: &[f64]) -> f64 {
     let n = x.len() as f64;
+    let freedom = (n - 1.0).max(1.0);
     let mean = x.iter().sum::<f64>() / n;
-    let variance = x.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
-    mean / (variance / n).sqrt().max(1e-12)
+    let variance = x.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / freedom;
+    let t = mean / (variance / n).sqrt().max(1e-12);
+    let small_sample = (8.0 * freedom + 1.0) / (8.0 * freedom + 3.0);
+    (small_sample * (freedom * (t * t / freedom).ln_1p()).sqrt()).copysign(t)
 }
 
 /// One node (step) of the model search: the current model and the candidates to extend it, fitted under common window weights.
@@ -139,6 +144,19 @@ impl<const N: usize, const P: usize> SearchNode<N, P> {
         let base: f64 = self.base.holdout.iter().sum();
         let here: f64 = candidate.holdout.iter().sum();
         (base - here) / (base - self.floor).max(1e-9 * base)
+    }
+
+    /// Index of the alternative that adds the same effect as `candidate`; where there is none, `fitted` makes it under the node's weights.
+    pub(crate) fn index_of(
+        &mut self,
+        candidate: &Candidate<P>,
+        fitted: impl FnOnce(&Self) -> Candidate<P>,
+    ) -> usize {
+        self.candidates.iter().position(|c| c.is_same(candidate)).unwrap_or_else(|| {
+            let missing = fitted(self);
+            self.candidates.push(missing);
+            self.candidates.len() - 1
+        })
     }
 
     /// RMS improvement of the predictions by a candidate on the holdout, relative to the RMS motion within the windows.
@@ -434,9 +452,23 @@ mod tests {
         let base = candidate("stribeck", 0.5, &[5.0, 5.0], &[5.0, 7.0]);
         let better = candidate("stribeck", 0.5, &[4.0, 4.0], &[2.0, 6.0]);
         assert_eq!(better.advantages(&base), [1.0, 1.0, 3.0, 1.0]);
-        // Mean 1.5, standard error sqrt(1 / 4); on the holdout mean 2, standard error sqrt(2 / 2).
-        assert!((better.z_over(&base) - 3.0).abs() < 1e-12);
-        assert!((better.holdout_z_over(&base) - 2.0).abs() < 1e-12);
-        assert!((base.z_over(&better) + 3.0).abs() < 1e-12);
+        // Mean 1.5, standard error sqrt(1 / 4): t of 3 with 3 degrees of freedom is exceeded with probability 0.02883, a normal deviate of 1.898.
+        assert!((better.z_over(&base) - 1.898).abs() < 0.02);
+        // On the holdout mean 2, standard error sqrt(2 / 2): t of 2 with 1 degree of freedom, 0.14758 and 1.047.
+        assert!((better.holdout_z_over(&base) - 1.047).abs() < 0.02);
+        assert_eq!(base.z_over(&better), -better.z_over(&base));
+    }
+
+    #[test]
+    fn few_windows_have_to_show_more() {
+        let of = |n: usize, t: f64| {
+            let spread = |i: usize| if i % 2 == 0 { 1.0 } else { -1.0 };
+            let error = (1.0 / (n as f64 - 1.0)).sqrt();
+            z_score(&(0..n).map(|i| t * error + spread(i)).collect::<Vec<_>>())
+        };
+        // Student's t of 31 degrees of freedom exceeds 3.375 with the probability with which a normal deviate exceeds 3.090.
+        assert!((of(32, 3.375) - 3.090).abs() < 0.01);
+        assert!((of(2000, 3.5) - 3.5).abs() < 0.02);
+        assert_eq!(of(40, 0.0), 0.0);
     }
 }

@@ -31,6 +31,14 @@ pub struct Cause {
     pub ground: Ground,
 }
 
+impl Cause {
+    /// The cause, chosen over its rivals with the probability `better`.
+    pub(crate) fn chosen_with(self, better: f64) -> Self {
+        let evidence = Evidence { selected: better, ..self.evidence };
+        Self { probability: better, evidence, ..self }
+    }
+}
+
 impl<const N: usize, const P: usize> SearchNode<N, P> {
     /// Whether the effects of the candidates with indices `a` and `b` give the same motion under any torques, so that no log distinguishes them.
     fn are_equivalent(&self, a: usize, b: usize) -> bool {

@@ -172,8 +172,14 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             if search.causes.len() >= max_causes {
                 break;
             }
+            let chosen = choose(&search.node, search.regularised, search.threshold);
+            let has_room = search.causes.len() + 2 <= max_causes;
+            if let Some(pair) = has_room.then(|| self.better_pair(search, chosen, seed)).flatten() {
+                self.accept_pair(search, &pair, min_relevance, seed);
+                continue;
+            }
             let node = &search.node;
-            let next = if let Some((choice, ground)) = choose(node, search.regularised, search.threshold) {
+            let next = if let Some((choice, ground)) = chosen {
                 let chosen = &node.candidates[choice];
                 if chosen.effect.is_some() {
                     search.causes.push(name(node, choice, ground, seed));

@@ -13,7 +13,6 @@ use crate::model::hypothesis::{EffectInstance, Hypothesis};
 use crate::search::acceptance::{ABOVE_FLOOR, Ground, MATTERS, is_possible};
 use crate::search::attribute::{Candidate, SearchNode};
 use crate::search::belief::{Cause, name, probability_over};
-use crate::search::evidence::Evidence;
 use crate::search::model_search::{ModelSearch, added};
 use crate::search::rivals::equivalent;
 use armgap_core::arm::Arm;
@@ -28,7 +27,7 @@ const MAX_RIVALS: usize = 3;
 
 /// Mean decrease of the windows' cost, in standard errors of this mean, when a rival replaces a cause in the model with all other causes, above which
 /// the rival is better.
-const BETTER: f64 = 2.0;
+pub(crate) const BETTER: f64 = 2.0;
 
 /// Factor by which the RMS prediction error may be larger with a rival that has fewer free values than the cause it replaces.
 const AS_WELL: f64 = 1.05;
@@ -170,20 +169,14 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     ) -> ModelSearch<N, P> {
         let mut node = search.nodes[rival.node].clone();
         let added = node.settled.hypothesis.effects.len();
-        let choice = node.candidates.iter().position(|c| c.is_same(&rival.fitted)).unwrap_or_else(|| {
-            let start = &rival.fitted.fit.hypothesis;
-            node.candidates.push(self.candidate(&node.weights, start, added, Effort::FULL, None));
-            node.candidates.len() - 1
-        });
+        let fitted = |node: &SearchNode<N, P>| {
+            self.candidate(&node.weights, &rival.fitted.fit.hypothesis, added, Effort::FULL, None)
+        };
+        let choice = node.index_of(&rival.fitted, fitted);
         let before = &node.settled.hypothesis;
         let known = |c: &&Cause| before.effects.iter().any(|e| e.same_place(&c.effect));
         let mut causes: Vec<Cause> = search.causes.iter().filter(known).cloned().collect();
-        let named = name(&node, choice, Ground::Motion, seed);
-        causes.push(Cause {
-            probability: better,
-            evidence: Evidence { selected: better, ..named.evidence },
-            ..named
-        });
+        causes.push(name(&node, choice, Ground::Motion, seed).chosen_with(better));
         let next = node.candidates[choice].fit.clone();
         let mut other = ModelSearch {
             causes,
