@@ -462,7 +462,7 @@ mod tests {
     #[test]
     fn few_windows_have_to_show_more() {
         let of = |n: usize, t: f64| {
-            let spread = |i: usize| if i % 2 == 0 { 1.0 } else { -1.0 };
+            let spread = |i: usize| if i.is_multiple_of(2) { 1.0 } else { -1.0 };
             let error = (1.0 / (n as f64 - 1.0)).sqrt();
             z_score(&(0..n).map(|i| t * error + spread(i)).collect::<Vec<_>>())
         };
