@@ -57,15 +57,15 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         seed: u64,
     ) -> Option<Pair<P>> {
         let node = &search.node;
-        let is_left = |c: &Candidate<P>| c.effect.is_some() && node.share(c) <= MOST_OF_GAP;
-        let single = match single {
-            Some((index, Ground::Motion)) => Some(node.candidates.get(index).filter(|c| is_left(c))?),
-            Some((_, Ground::Trust)) => return None,
-            None => None,
-        };
         if !node.is_open() {
             return None;
         }
+        let leaves_most = |c: &Candidate<P>| c.effect.is_some() && node.share(c) <= MOST_OF_GAP;
+        let single = match single {
+            Some((index, Ground::Motion)) => Some(node.candidates.get(index).filter(|c| leaves_most(c))?),
+            Some((_, Ground::Trust)) => return None,
+            None => None,
+        };
         let alone = single.and_then(|c| c.effect);
         let pairs = self.fitted_pairs(node, alone.as_ref());
         let has_single = |pair: &&Fitted<P>| alone.is_some_and(|effect| pair.contains(&effect));
