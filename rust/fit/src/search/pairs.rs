@@ -13,7 +13,7 @@ use crate::likelihood::context::DiagnosisContext;
 use crate::likelihood::jacobian::Sensitivities;
 use crate::likelihood::solve::Effort;
 use crate::model::hypothesis::{EffectInstance, Hypothesis};
-use crate::search::acceptance::{Ground, MOST_OF_GAP, certain, is_possible, moves};
+use crate::search::acceptance::{Ground, MOST_OF_GAP, certain, is_possible, moves, restores};
 use crate::search::attribute::{Candidate, SearchNode};
 use crate::search::belief::{name, probability_over};
 use crate::search::model_search::ModelSearch;
@@ -156,8 +156,11 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         if !is_possible(&second) {
             return;
         }
+        // Beside the first effect the parameters may take up the second one, as a rotor's inertia, at values that they cannot have.
+        let by_trust = !moves(&search.node, &second, search.threshold) && restores(&search.node, &second);
+        let ground = if by_trust { Ground::Trust } else { Ground::Motion };
         let choice = search.node.index_of(&second, |_| second.clone());
-        search.causes.push(name(&search.node, choice, Ground::Motion, seed));
+        search.causes.push(name(&search.node, choice, ground, seed));
         let next = search.node.candidates[choice].fit.clone();
         self.advance(search, &next, min_relevance);
     }
