@@ -292,18 +292,7 @@ mod tests {
 
     fn test_by(name: &str, joint: usize, gain: f64) -> ScoreTest {
         let law = find::<f64>(name).expect("known");
-        ScoreTest {
-            effect: EffectInstance::new(law, joint, [0.0; 3]),
-            gain,
-            estimate: 0.0,
-            sigma: 0.0,
-            information_sigma: 0.0,
-            imitation: Vec::new(),
-            size: 0.0,
-            share: 1.0,
-            tested: 0,
-            distinct: 0.0,
-        }
+        ScoreTest::of(EffectInstance::new(law, joint, [0.0; 3]), gain, 0.0)
     }
 
     #[test]

@@ -157,18 +157,8 @@ mod tests {
 
     #[test]
     fn one_test_stands_for_every_effect_on_a_joint() {
-        let test = |joint: usize, gain: f64, distinct: f64| ScoreTest {
-            effect: EffectInstance::new(find::<f64>("actuator_lag").expect("known"), joint, [0.0; 3]),
-            gain,
-            estimate: 0.0,
-            sigma: 0.0,
-            information_sigma: 0.0,
-            imitation: Vec::new(),
-            size: 0.0,
-            share: 1.0,
-            tested: 0,
-            distinct,
-        };
+        let lag = |joint| EffectInstance::new(find::<f64>("actuator_lag").expect("known"), joint, [0.0; 3]);
+        let test = |joint: usize, gain: f64, distinct: f64| ScoreTest::of(lag(joint), gain, distinct);
         let tests = [test(0, 1.0, 1.0), test(1, 2.0, 1.0), test(0, 5.0, 1.0), test(2, 9.0, 0.01)];
         assert_eq!(best_of_each(&tests, 0.03), [2, 1]);
     }

@@ -339,6 +339,16 @@ impl ScoreTest {
 }
 
 #[cfg(test)]
+impl ScoreTest {
+    /// A score test with its effect, gain and distinct share alone.
+    pub(crate) fn of(effect: EffectInstance, gain: f64, distinct: f64) -> Self {
+        let mut test = scored(&effect, 1.0, 1.0, 0.0, 0.0);
+        (test.effect, test.gain, test.distinct) = (effect, gain, distinct);
+        test
+    }
+}
+
+#[cfg(test)]
 mod tests {
     use super::*;
 
