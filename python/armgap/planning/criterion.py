@@ -355,12 +355,28 @@ class PredictedMotion:
         """Return the difference of predictions between the pair's first model and the rival."""
         return self._difference(pair.alternatives[0][1], pair)[0]
 
-    def left_of(self, delta: Array, column: Array | None = None) -> tuple[float, float]:
-        """Return the squared rest of a difference after a fit of the values common to all models, and the coefficient of `column`, if fitted too."""
-        free = np.empty((len(delta), 0)) if column is None else column[:, None]
+    def left_of(self, delta: Array, *free: Array) -> tuple[float, Array]:
+        """Return the squared rest of a difference after a fit of the values common to all models, and the coefficients of columns fitted too."""
+        columns = np.column_stack(free) if free else np.empty((len(delta), 0))
         _, whole = self._weights_of(self._setting.rest)
-        found = Columns(self.sensitivities(), free, (), len(self._arm.sigma)).fitted(delta, whole)
-        return found.square, 0.0 if column is None else float(found.values[-1])
+        common = self.sensitivities()
+        found = Columns(common, columns, (), len(self._arm.sigma)).fitted(delta, whole)
+        return found.square, found.values[common.shape[1] :]
+
+    def imitations(self, effect: EffectInstance, rival: tuple[EffectInstance, ...]) -> list[Array]:
+        """Return changes of the predictions that an effect can make beside `rival`, to first order: by itself, and by each of its values.
+
+        Raises
+        ------
+        ValueError
+            If the arm with the effect cannot be predicted along the motion.
+        """
+        pair = HypothesisPair((), (*rival, effect), effect)
+        lead = latent(pair.rival)
+        theta = self._setting.model.theta
+        change = self.predicted(theta, pair.rival, lead) - self.predicted(theta, rival, lead)
+        _, by_value = self._of_rival(pair, lead)
+        return [change, *by_value.T]
 
     def _difference(self, effects: tuple[EffectInstance, ...], pair: HypothesisPair) -> tuple[Array, bool]:
         lead = latent((*effects, *pair.rival))

@@ -1,8 +1,9 @@
-"""Reference motions: fifth-order moves between two poses, around each of which every joint oscillates at two frequencies.
+"""Reference motions: fifth-order moves between one or two poses, around each of which every joint oscillates at two or four frequencies.
 
 A motion begins and ends at rest at a home pose, moves to a first pose, oscillates around it, moves to a second pose, oscillates there, and
-returns. Slow reversals, fast oscillations and large travel are special cases. All design variables between 0 and 1 give motions within the
-limits: poses lie within the range of positions, moves take as long as speed and acceleration require, and oscillations are scaled down.
+returns; or it oscillates around one pose all the time, at twice as many frequencies. Slow reversals, fast oscillations, large travel and
+multisines are special cases. All design variables between 0 and 1 give motions within the limits: poses lie within the range of positions,
+moves take as long as speed and acceleration require, and oscillations are scaled down.
 """
 
 from __future__ import annotations
@@ -24,6 +25,9 @@ Array = NDArray[np.float64]
 PHASES, SINES = 2, 2
 #: Number of design variables per joint of a reference motion: pose, and amplitude and frequency of every oscillation, in both phases.
 PER_JOINT = PHASES * (1 + 2 * SINES)
+#: Values of the first design variable below which a motion has one phase with all oscillations, around the pose of the first; above, it is the first
+#: phase's part of the time, within two bounds.
+ONE_PHASE, SHARES = 0.3, (0.2, 0.8)
 #: Time at rest at either end of a reference motion, s.
 _REST_TIME_S = 0.2
 #: Shortest duration of a move between two poses of a reference motion, s.
@@ -46,20 +50,20 @@ LOOK_HZ = 200.0
 
 @dataclass(frozen=True)
 class Motion:
-    """Reference motion: moves between home and two poses, with oscillations around each pose.
+    """Reference motion: moves between home and one or two poses, with oscillations around each pose.
 
     Attributes
     ----------
     home : ndarray, shape (n_joints,)
         Pose at the beginning and the end [rad or m].
     times : tuple of float
-        Beginning and end of each of the three moves: six instants [s].
+        Beginning and end of each of the moves, of which there is one more than phases [s].
     duration : float
         Length of the motion [s].
-    centres : ndarray, shape (2, n_joints)
-        Poses of the two phases [rad or m].
-    amplitude, frequency : ndarray, shape (2, n_joints, 2)
-        Amplitude [rad or m] and frequency [Hz] of the two oscillations of each joint in the two phases.
+    centres : ndarray, shape (n_phases, n_joints)
+        Poses of the phases [rad or m].
+    amplitude, frequency : ndarray, shape (n_phases, n_joints, n_sines)
+        Amplitude [rad or m] and frequency [Hz] of the oscillations of each joint in the phases.
     scale : float
         Factor of all deviations from home, 0 to 1.
     """
@@ -77,13 +81,13 @@ class Motion:
         n = len(self.home)
         q, dq, ddq = np.tile(self.home, (len(t), 1)), np.zeros((len(t), n)), np.zeros((len(t), n))
         poses = [self.home, *self.centres, self.home]
-        for i in range(PHASES + 1):
+        for i in range(len(self.centres) + 1):
             begin, end = self.times[2 * i], self.times[2 * i + 1]
             parts = _blend((t - begin) / (end - begin))
             step = poses[i + 1] - poses[i]
             for total, part, power in zip((q, dq, ddq), parts, range(3), strict=True):
                 total += np.outer(part / (end - begin) ** power, step)
-        for i in range(PHASES):
+        for i in range(len(self.centres)):
             begin, end = self.times[2 * i + 1], self.times[2 * i + 2]
             inside = (t > begin) & (t < end)
             found = oscillation(t[inside] - begin, end - begin, self.amplitude[i], self.frequency[i])
@@ -108,8 +112,8 @@ def build(numbers: Array, home: Array, limits: MotionLimits, duration: float, pe
     Parameters
     ----------
     numbers : ndarray, shape (`count(n_joints)`,)
-        Design variables from 0 to 1: the first phase's part of the time; then per joint and phase the pose, and an amplitude and a frequency
-        for each of two oscillations.
+        Design variables from 0 to 1: one phase or two, with the first one's part of the time; then per joint and phase the pose, and an amplitude and
+        a frequency for each of two oscillations. A motion with one phase has the first pose and all oscillations.
     home : ndarray, shape (n_joints,)
         Pose at the beginning and the end [rad or m], within the limits.
     limits : MotionLimits
@@ -121,28 +125,32 @@ def build(numbers: Array, home: Array, limits: MotionLimits, duration: float, pe
     """
     n = len(home)
     low, high = limits.position_min, limits.position_max
-    share = 0.2 + 0.6 * float(numbers[0])
     table = numbers[1:].reshape(n, PHASES, 1 + 2 * SINES).transpose(1, 0, 2)
-    centres = low + table[:, :, 0] * (high - low)
+    poses, sines = table[:, :, 0], table[:, :, 1:]
+    first = float(np.interp(numbers[0], (ONE_PHASE, 1.0), SHARES))
+    shares = [first, 1.0 - first]
+    if numbers[0] < ONE_PHASE:
+        poses, sines, shares = poses[:1], np.concatenate(list(sines), axis=1)[None], [1.0]
+    centres = low + poses * (high - low)
     available = duration - 2 * _REST_TIME_S
     moves = _moves(home, centres, limits)
     while sum(moves) > 0.5 * available and np.max(np.abs(centres - home)) > 1e-6:
         centres = home + 0.8 * (centres - home)
         moves = _moves(home, centres, limits)
-    left = available - sum(moves)
-    lengths = (share * left, (1 - share) * left)
-    instants = _REST_TIME_S + np.cumsum([0.0, moves[0], lengths[0], moves[1], lengths[1], moves[2]])
-    lowest = np.array([[1.0 / length] for length in lengths])[:, :, None]
-    frequency = lowest * (highest_frequency(limits, period)[None, :, None] / lowest) ** table[:, :, 2::2]
+    lengths = [share * (available - sum(moves)) for share in shares]
+    parts = [moves[0], *(x for pair in zip(lengths, moves[1:], strict=True) for x in pair)]
+    instants = _REST_TIME_S + np.cumsum([0.0, *parts])
+    lowest = 1.0 / np.array(lengths)[:, None, None]
+    frequency = lowest * (highest_frequency(limits, period)[None, :, None] / lowest) ** sines[:, :, 1::2]
     frequency = np.maximum(frequency, lowest)
     amplitude = np.empty_like(frequency)
-    for i in range(PHASES):
+    for i, length in enumerate(lengths):
         room = np.minimum(centres[i] - low, high - centres[i])
         omega = 2 * np.pi * frequency[i]
         most = np.minimum(limits.speed[:, None] / omega, limits.acceleration[:, None] / omega**2)
-        wanted = np.minimum(room[:, None], most) * SMALLEST ** (1.0 - table[i, :, 1::2])
-        tau = np.linspace(0.0, lengths[i], max(int(LOOK_HZ * lengths[i]), 2))
-        peaks = [np.max(np.abs(x), axis=0) for x in oscillation(tau, lengths[i], wanted, frequency[i])]
+        wanted = np.minimum(room[:, None], most) * SMALLEST ** (1.0 - sines[i, :, ::2])
+        tau = np.linspace(0.0, length, max(int(LOOK_HZ * length), 2))
+        peaks = [np.max(np.abs(x), axis=0) for x in oscillation(tau, length, wanted, frequency[i])]
         allowed = (room, limits.speed, limits.acceleration)
         ratio = [a / np.maximum(p, 1e-12) for a, p in zip(allowed, peaks, strict=True)]
         # Between two of the compared points a peak may be higher by a hundredth.
@@ -157,7 +165,7 @@ def highest_frequency(limits: MotionLimits, period: float) -> Array:
 
 
 def _moves(home: Array, centres: Array, limits: MotionLimits) -> list[float]:
-    """Return the shortest times [s] of the three moves, in each of which all joints move for the same time."""
+    """Return the shortest times [s] of the moves, in each of which all joints move for the same time."""
     poses = [home, *centres, home]
     times = []
     for before, after in pairwise(poses):
@@ -177,17 +185,16 @@ def oscillation(tau: Array, length: float, amplitude: Array, frequency: Array) -
         Times since the phase's beginning [s].
     length : float
         Length of the phase [s].
-    amplitude, frequency : ndarray, shape (n_joints, 2)
-        Amplitudes [rad or m] and frequencies [Hz] of the two oscillations of each joint.
+    amplitude, frequency : ndarray, shape (n_joints, n_sines)
+        Amplitudes [rad or m] and frequencies [Hz] of the oscillations of each joint.
     """
-    n = len(amplitude)
     fade = min(FADE, FADE_PART * length)
     rise, fall = _blend(tau / fade), _blend((length - tau) / fade)
     e = rise[0] * fall[0]
     # Rise and fall do not overlap: where one changes, the other is 1.
     de, dde = (rise[1] - fall[1]) / fade, (rise[2] + fall[2]) / fade**2
     omega = 2 * np.pi * frequency
-    offset = GOLDEN * np.arange(n * SINES).reshape(n, SINES)
+    offset = GOLDEN * np.arange(amplitude.size).reshape(amplitude.shape)
     angle = omega[None] * tau[:, None, None] + offset[None]
     w = np.sum(amplitude * np.sin(angle), axis=2)
     dw = np.sum(amplitude * omega * np.cos(angle), axis=2)
@@ -204,26 +211,30 @@ def _blend(x: Array) -> tuple[Array, Array, Array]:
 
 #: Design variables, 0 to 1, for a slow frequency and for a small amplitude in the usual motions.
 _SLOW, _SMALL = 0.15, 0.4
-_PATTERNS: dict[str, tuple[tuple[float, float, float, float], tuple[float, float, float, float]]] = {
-    "slow reversals": ((_SMALL, 0.35, 0.5, 0.5), (0.7, _SLOW, _SMALL, 0.4)),
-    "fast multisine": ((1.0, 0.6, 0.9, 0.9), (1.0, 0.75, 0.9, 0.5)),
-    "large travel": ((1.0, _SLOW, 0.3, 0.6), (1.0, 0.3, 0.3, 0.8)),
-    "slow, then fast": ((0.6, 0.25, _SMALL, 0.5), (1.0, 0.6, 0.9, 0.85)),
+#: Usual motions: the first design variable, and amplitudes and frequencies of the oscillations of both phases.
+_PATTERNS: dict[str, tuple[float, tuple[float, float, float, float], tuple[float, float, float, float]]] = {
+    "slow reversals": (0.65, (_SMALL, 0.35, 0.5, 0.5), (0.7, _SLOW, _SMALL, 0.4)),
+    "fast multisine": (0.65, (1.0, 0.6, 0.9, 0.9), (1.0, 0.75, 0.9, 0.5)),
+    "large travel": (0.65, (1.0, _SLOW, 0.3, 0.6), (1.0, 0.3, 0.3, 0.8)),
+    "slow, then fast": (0.65, (0.6, 0.25, _SMALL, 0.5), (1.0, 0.6, 0.9, 0.85)),
+    "one multisine": (0.15, (1.0, 0.05, 1.0, 0.3), (1.0, 0.45, 1.0, 0.6)),
+    "one slow multisine": (0.15, (1.0, 0.0, 1.0, 0.2), (0.9, 0.3, 0.9, 0.4)),
 }
 
 
 def named(name: str, n_joints: int, poses: tuple[float, float] = (0.5, 0.5)) -> Array:
-    """Return the design variables of one of the four usual motions, with which a search begins.
+    """Return the design variables of one of the usual motions, with which a search begins.
 
     Parameters
     ----------
-    name : {"slow reversals", "fast multisine", "large travel", "slow, then fast"}
-        Name of the motion; the four excite friction, inertia, effects of the position, and several of these.
+    name : {"slow reversals", "fast multisine", "large travel", "slow, then fast", "one multisine", "one slow multisine"}
+        Name of the motion. The first four, with two phases, excite friction, inertia, effects of the position, and several of these; the
+        others have one phase.
     n_joints : int
         Number of joints.
     poses : tuple of float, default the middle of the range
         Poses at which the joints oscillate, from 0 to 1 of their ranges.
     """
-    first, second = _PATTERNS[name]
+    start, first, second = _PATTERNS[name]
     joint = [poses[0], *first, poses[1], *second]
-    return np.array([0.5, *joint * n_joints])
+    return np.array([start, *joint * n_joints])

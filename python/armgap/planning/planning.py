@@ -39,8 +39,10 @@ __all__ = ["Plan", "PlannedQuestion", "plan"]
 
 Array = NDArray[np.float64]
 
-#: Largest number of questions that a motion is planned for by default.
-MOST_QUESTIONS = 5
+#: Largest number of open questions of a diagnosis that a motion is planned for by default, and of all pairs of an effect and a rival, those against
+#: effects that imitate it among them. The more imitators are left out, the more the search finds motions that some of them fit: small oscillations
+#: around two poses show a torque over position at two places only.
+MOST_QUESTIONS, MOST_PAIRS = 5, 10
 #: Log-likelihood ratio that a decision needs, in addition to the logarithm of the number of candidates.
 DECISION = 3.0
 #: Expected log-likelihood ratio below which evidence counts as none.
@@ -331,7 +333,7 @@ def _plan(data: dict[str, Any], arm: Arm, wanted: Sequence[str], duration: float
     if not named:
         tested.sort(key=_urgency)
     chosen = tested if named else tested[:MOST_QUESTIONS]
-    if len(chosen) < MOST_QUESTIONS:
+    if len(chosen) < MOST_PAIRS:
         chosen += _against_look_alikes(builder, chosen, usual, remarks)
     settling = {p.question.text for p in chosen}
     left = (
@@ -383,7 +385,7 @@ def _against_look_alikes(
     weighed = [(usual.outcome(p.quick), p) for p in posed if p is not None]
     remarks += [f"{p.question.text}: a usual motion does not tell them apart" for x, p in weighed if x.kept < IDENTICAL]
     doubtful = sorted(((x.expected, p) for x, p in weighed if x.kept >= IDENTICAL), key=lambda x: x[0])
-    return [p for _, p in doubtful][: MOST_QUESTIONS - len(chosen)]
+    return [p for _, p in doubtful][: MOST_PAIRS - len(chosen)]
 
 
 def _urgency(tested: TestedQuestion) -> tuple[int, float]:

@@ -25,7 +25,7 @@ __all__ = ["Found", "Search", "standard"]
 Array = NDArray[np.float64]
 
 #: Number of motions in a generation of differential evolution, and number of generations after the first.
-POPULATION, GENERATIONS = 16, 9
+POPULATION, GENERATIONS = 20, 9
 #: Largest number of windows on which motions are compared, and number of best motions that are compared again on all windows.
 _MAX_COMPARED_WINDOWS, FINALISTS = 20, 4
 #: Largest number of steps in which a motion is scaled down until its torques are within limits and it is free of collision.
@@ -43,7 +43,7 @@ _POSES_PER_JOINT, LEFT = 5, 0.1
 #: Part of the torque left for accelerations that a joint's own acceleration takes; the rest is for the other joints' accelerations.
 COUPLED = 0.6
 #: Usual motions with which a search begins, and pairs of poses at which they oscillate, from 0 to 1 of each joint's range.
-_SEEDS = ("slow, then fast", "large travel", "fast multisine", "slow reversals")
+_SEEDS = ("slow, then fast", "large travel", "fast multisine", "slow reversals", "one multisine", "one slow multisine")
 _POSE_PAIRS = ((0.5, 0.5), (0.3, 0.7), (0.8, 0.35))
 
 

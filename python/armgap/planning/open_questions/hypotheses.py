@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -31,6 +31,10 @@ SIZES = 5
 NODES, WEIGHTS = (-math.sqrt(3.0), 0.0, math.sqrt(3.0)), (1 / 6, 2 / 3, 1 / 6)
 #: Largest standard deviation of the logarithm of a stiffness with which values of an elastic joint are tried.
 SPREAD = 1.0
+#: Standard deviations by which a diagnosis' estimate of an effect differs from none for the estimate to stand for the effect's size.
+DETERMINED = 2.0
+#: Smallest likelihood of a size relative to that of the diagnosis' estimate: of sizes all far from it none is left out.
+LEAST_LIKELY = 1e-3
 #: An effect may imitate another one if, with only its size fitted, it leaves less than this part of that one's evidence in a usual motion.
 IMITATES = 0.5
 
@@ -91,7 +95,8 @@ class HypothesisBuilder:
         ValueError
             If a model cannot be predicted along the usual motion.
         """
-        without = tuple(e for e in self._base if (e.effect, e.joint) != question.place)
+        gone = {question.place, question.rival, *question.replaced}
+        without = tuple(e for e in self._base if (e.effect, e.joint) not in gone)
         groups = self._alternatives(question, without)
         if not groups:
             return None
@@ -141,33 +146,41 @@ class HypothesisBuilder:
                 continue
             if frozenset((tested.question.place, place)) in same:
                 continue
-            left = [self._left_by(e, tested.pair.rival, target) for e in self._tried(place, tested.pair.rival, target)]
-            if left and min(left) < IMITATES * whole:
-                found.append((min(left), replace(tested.question, against=place[0], against_joint=place[1])))
+            left = min((x for x, _ in self._imitators(place, tested.pair.rival, target)), default=math.inf)
+            if left < IMITATES * whole:
+                found.append((left, replace(tested.question, against=place[0], against_joint=place[1])))
         return [question for _, question in sorted(found, key=lambda x: x[0])]
-
-    def _left_by(self, effect: EffectInstance, without: tuple[EffectInstance, ...], target: Array) -> float:
-        """Return the square of what an effect and a fit of the arm's values leave of the difference `target`; infinite if not computable."""
-        try:
-            made = self._usual.difference(HypothesisPair(((1.0, (*without, effect)),), without))
-        except ValueError:
-            return math.inf
-        return self._usual.left_of(target - made)[0]
 
     def _alternatives(
         self, question: Question, without: tuple[EffectInstance, ...]
     ) -> list[tuple[float, EffectInstance]]:
-        if question.estimate is not None:
-            return self._estimated(question)
         known = shapes(*question.place, self._scales)
+        if question.estimate is not None and self._is_determined(question, known):
+            return self._estimated(question)
         if not known:
             values = levels(*question.place, self._scales)
             return _even(self._instance(question.place, v) for v in values)
-        return _even(
-            self._instance(question.place, shape.at(size))
+        found = [
+            (_likelihood(question, shape, size), self._instance(question.place, shape.at(size)))
             for shape in known
             for size in self._sizes(question, shape, without)
-        )
+        ]
+        total = sum(weight for weight, _ in found)
+        return [(weight / total, effect) for weight, effect in found]
+
+    def _is_determined(self, question: Question, known: Sequence[Shape]) -> bool:
+        """Return whether the diagnosis' estimate stands for the effect's size: that of a cause, or one that differs significantly from none.
+
+        An effect with components, such as sine and cosine of a turn, differs if one of them does. One with a threshold is known if it is a candidate.
+        """
+        assert question.estimate is not None
+        if any((c["effect"], c["joint"]) == question.place for c in self._data["causes"]):
+            return True
+        if not known:
+            return any((c["effect"], c["joint"]) == question.place for c in self._data.get("candidates") or [])
+        specs = self._specs[question.effect]
+        sizes = [question.estimate[s["name"]] for s in specs if s["unit"] == specs[0]["unit"]]
+        return any(abs(value - known[0].neutral) > DETERMINED * sigma for value, sigma in sizes)
 
     def _instance(self, place: tuple[str, int | None], values: Mapping[str, float]) -> EffectInstance:
         """Return an effect with values kept within the bounds of its parameters: small and slow motions suggest some beyond them."""
@@ -211,46 +224,68 @@ class HypothesisBuilder:
         )
 
     def _rival(self, question: Question, rough: HypothesisPair) -> EffectInstance:
-        """Return the rival effect with the diagnosis' values, or with values that best imitate the effect over the usual motion."""
-        for entry in self._entries(question.rival):
-            values = {name: float(p["value"]) for name, p in entry["parameters"].items()}
-            return EffectInstance(*question.rival, {**values, **at_motor(entry.get("sides"))})
+        """Return the rival effect with the diagnosis' values or with others, whichever best imitate the effect over the usual motion."""
         middle = rough.alternatives[len(rough.alternatives) // 2]
         target = self._usual.difference(HypothesisPair((middle,), rough.rival))
-        best: tuple[float, EffectInstance] | None = None
-        for effect in self._tried(question.rival, rough.rival, target):
-            left = self._left_by(effect, rough.rival, target)
-            if best is None or left < best[0]:
-                best = left, effect
-        assert best is not None
-        return best[1]
+        found = list(self._imitators(question.rival, rough.rival, target))
+        for entry in self._entries(question.rival)[:1]:
+            values = {name: float(p["value"]) for name, p in entry["parameters"].items()}
+            effect = EffectInstance(*question.rival, {**values, **at_motor(entry.get("sides"))})
+            found += self._left_beside(effect, rough.rival, target)
+        if not found:
+            raise ValueError(f"{question.text}: the rival cannot be predicted")
+        return min(found, key=lambda x: x[0])[1]
 
-    def _tried(
+    def _left_beside(
+        self, effect: EffectInstance, without: tuple[EffectInstance, ...], target: Array
+    ) -> list[tuple[float, EffectInstance]]:
+        """Return an effect with the square of what a first-order fit of all its values leaves of `target`; nothing if not computable."""
+        try:
+            return [(self._usual.left_of(target, *self._usual.imitations(effect, without))[0], effect)]
+        except ValueError:
+            return []
+
+    def _imitators(
         self, place: tuple[str, int | None], without: tuple[EffectInstance, ...], target: Array
-    ) -> Iterable[EffectInstance]:
-        """Yield instances of an effect: per shape one of typical size and one of the size that best fits the target; its levels for a threshold."""
+    ) -> Iterable[tuple[float, EffectInstance]]:
+        """Yield instances of an effect, one per shape or level, each with the square of what it may leave of the difference `target`.
+
+        That is left by a fit of all values of the effect, to first order, and of the arm's: a spring with a far-off rest position is an offset. The
+        instance has the size that fits the target best by itself, or the typical one where that is not possible.
+        """
         spec = self._specs[place[0]][0]
         for shape in shapes(*place, self._scales):
             typical = self._instance(place, shape.at(shape.typical))
-            yield typical
             try:
-                made = self._usual.difference(HypothesisPair(((1.0, (*without, typical)),), without))
+                columns = self._usual.imitations(typical, without)
             except ValueError:
                 continue
-            _, factor = self._usual.left_of(target, made)
-            size = factor * shape.typical
-            if shape.inverse and size <= 0:
-                continue
-            values = shape.at(size)
-            if spec["lower"] <= values[shape.main] <= spec["upper"]:
-                yield self._instance(place, values)
+            left, _ = self._usual.left_of(target, *columns)
+            size = float(self._usual.left_of(target, columns[0])[1][0]) * shape.typical
+            is_possible = (size > 0 or not shape.inverse) and spec["lower"] <= shape.at(size)[shape.main] <= spec[
+                "upper"
+            ]
+            yield left, self._instance(place, shape.at(size)) if is_possible else typical
         for level in levels(*place, self._scales) if not shapes(*place, self._scales) else ():
-            yield self._instance(place, level)
+            yield from self._left_beside(self._instance(place, level), without, target)
 
     def _range(self, question: Question, effects: list[EffectInstance]) -> tuple[str, float, float] | None:
         name = self._specs[question.effect][0]["name"]
         values = [e.parameters[name] for e in effects if name in e.parameters and e.parameters[name] != 0]
         return (name, float(min(values)), float(max(values))) if values else None
+
+
+def _likelihood(question: Question, shape: Shape, size: float) -> float:
+    """Return the likelihood of an effect's size under the diagnosis' estimate, mean over both signs; 1 where there is no estimate."""
+    if question.estimate is None:
+        return 1.0
+    value, sigma = question.estimate[shape.main]
+    if shape.inverse:
+        value, sigma = 1.0 / value, sigma / value**2
+    if sigma <= 0:
+        return 1.0
+    places = [(sign * size + shape.neutral - value) / sigma for sign in (1.0, -1.0)]
+    return max(0.5 * sum(math.exp(-0.5 * x * x) for x in places), LEAST_LIKELY)
 
 
 def _even(effects: Iterable[EffectInstance]) -> list[tuple[float, EffectInstance]]:

@@ -16,6 +16,7 @@ from armgap.planning.open_questions.sizes import PLANNED
 __all__ = ["NONE", "Question", "asked", "known_model", "open_questions"]
 
 Data = dict[str, Any]
+Place = tuple[str, int | None]
 NONE = "none"
 """Word that stands in place of a rival effect where the question is whether an effect is present or absent."""
 
@@ -38,6 +39,8 @@ class Question:
         The diagnosis' estimates of the parameters of `effect` [SI].
     bound : float, optional
         Upper 95 % confidence limit of the size of `effect`, where it was not found [SI].
+    replaced : frozenset of (str, int or None)
+        Named causes in whose place `effect` would be: neither model of the question holds them.
     why : str
         The diagnosis' remark on the effect.
     """
@@ -49,6 +52,7 @@ class Question:
     origin: str = "asked"
     estimate: dict[str, tuple[float, float]] | None = None
     bound: float | None = None
+    replaced: frozenset[Place] = frozenset()
     why: str = ""
 
     @property
@@ -129,7 +133,7 @@ def open_questions(data: Data) -> tuple[list[Question], list[str]]:
             question = Question(cause["effect"], cause["joint"], *place, "undecided", _estimate(cause))
             found.append(replace(question, why=why))
         if entry["status"] == "not excited" or entry.get("bound"):
-            found.append(Question(*place, origin=entry["status"], bound=_bound(entry), why=why))
+            found.append(replace(_against_absence(*place, data), origin=entry["status"], why=why))
         elif not instead:
             remarks.append(f"{spelt(*place)}: {why}; no motion is planned for it")
     return _once(found), list(dict.fromkeys(remarks))
@@ -158,19 +162,41 @@ def asked(texts: Sequence[str], data: Data, arm: Arm) -> list[Question]:
         pairs = [q for q in open_questions(data)[0] if q.against != NONE]
         alike = {(effect, joint)}.union(*(pair for pair in inseparable(data) if (effect, joint) in pair))
         found += [q for q in pairs if q.place in alike and q.rival not in alike]
+        absent = _against_absence(effect, joint, data)
         found += [
-            Question(effect, joint, q.effect, q.joint, q.origin, why=q.why) for q in pairs if q.rival == (effect, joint)
+            replace(absent, against=q.effect, against_joint=q.joint, origin=q.origin, why=q.why)
+            for q in pairs
+            if q.rival == (effect, joint)
         ]
-        found.append(_against_absence(effect, joint, data))
+        found.append(absent)
     return _once(found)
 
 
 def _against_absence(effect: str, joint: int | None, data: Data) -> Question:
+    """Return the question whether an effect is present, with what the diagnosis knows of its size.
+
+    The diagnosis fitted the effect to the arm without causes (`ranking`). That is its estimate where no cause is named, or where the effect would be
+    in the place of one.
+    """
+    place = (effect, joint)
     for entry in (*data["causes"], *(data.get("candidates") or [])):
-        if (entry["effect"], entry["joint"]) == (effect, joint):
-            return Question(effect, joint, estimate=_estimate(entry))
-    bounds = [r for r in data["ruled_out"] if (r["effect"], r["joint"]) == (effect, joint)]
-    return Question(effect, joint, bound=_bound(bounds[0]) if bounds else None)
+        if (entry["effect"], entry["joint"]) == place:
+            return Question(*place, estimate=_estimate(entry))
+    bounds = [r for r in data["ruled_out"] if (r["effect"], r["joint"]) == place]
+    replaced = frozenset((c["effect"], c["joint"]) for c in data["causes"] if _is_alternative(place, c, bounds))
+    fitted = [r for r in data.get("ranking") or [] if (r["effect"], r["joint"]) == place]
+    return Question(
+        *place,
+        estimate=_estimate(fitted[0]) if fitted and (replaced or not data["causes"]) else None,
+        bound=_bound(bounds[0]) if bounds else None,
+        replaced=replaced,
+    )
+
+
+def _is_alternative(place: Place, cause: Data, entries: list[Data]) -> bool:
+    """Return whether an effect would be in the place of a named cause: it is among the cause's equivalents, or its entry says so."""
+    equivalents = [(other["effect"], other["joint"]) for other in cause["equivalents"]]
+    return place in equivalents or any(_would_stand_for(entry, cause) for entry in entries)
 
 
 def _parse(text: str, arm: Arm) -> tuple[str, int | None]:

@@ -146,7 +146,7 @@ def _elasticity(s: Scales, j: int) -> list[Shape]:
 
 
 def _ripple(s: Scales, j: int) -> list[Shape]:
-    return [Shape("amplitude", _torque(s, j), {"n": n, "phase": 0.8}) for n in (2.0, 8.0)]
+    return [Shape("amplitude", _torque(s, j), {"n": n, "phase": 0.8}) for n in (1.0, 2.0, 8.0)]
 
 
 def _spring(s: Scales, j: int) -> list[Shape]:

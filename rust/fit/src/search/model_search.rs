@@ -8,7 +8,7 @@ use crate::likelihood::encoder_zero::EncoderZeros;
 use crate::likelihood::solve::{Effort, Fit};
 use crate::model::hypothesis::{EffectInstance, Hypothesis};
 use crate::search::acceptance::{
-    CLEAR, FAINTEST, RELEVANT, TRUST_GAIN, UNEXPLAINED, certain, choose, min_relevance,
+    CLEAR, FAINTEST, Ground, RELEVANT, TRUST_GAIN, UNEXPLAINED, certain, choose, min_relevance,
 };
 use crate::search::attribute::{Candidate, SearchNode};
 use crate::search::belief::{Cause, name};
@@ -145,10 +145,12 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         }
         let settled = self.settle_without_zeros(start, scale);
         let node = self.node_around(settled.clone(), RELEVANT, None);
-        let explained = self.cost_with_zeros(&settled.0, &settled.1.training);
-        let least = node.field.iter().map(|(candidate, _)| candidate.training.iter().sum::<f64>());
-        let is_cause = choose(&node, false, min_relevance(node.relative_error())).is_some();
-        if is_cause && least.fold(f64::INFINITY, f64::min) < explained {
+        // Under the node's weights, which its best candidate makes: under those of an arm that misses an effect, the zeros do as well as the effect.
+        let explains_more = |(choice, _): (usize, Ground)| {
+            let with_cause: f64 = node.candidates[choice].training.iter().sum();
+            with_cause < self.cost_with_zeros(&settled.0, &node.weights.training)
+        };
+        if choose(&node, false, min_relevance(node.relative_error())).is_some_and(explains_more) {
             (settled, node)
         } else {
             with_zeros(node.traces.as_deref())
