@@ -375,6 +375,16 @@ def test_what_to_do_next_follows_from_the_verdict_and_the_result() -> None:
     assert next_steps(none)[0].startswith("First find out why")
 
 
+def test_a_gap_that_stays_asks_for_the_measured_torque_or_for_its_use() -> None:
+    data = cases.named().to_dict() | {"verdict": "unexplained"}
+    assert "in columns `tau_meas1`" in " ".join(next_steps(data | {"chain": []}))
+    measured = " ".join(next_steps(data | {"chain": [{"stage": "drive", "joint": 1, "share": 0.2}]}))
+    assert "--columns tau1=tau_meas1" in measured
+    assert "Log more" not in measured
+    serial = data | {"chain": [], "arm": {**data["arm"], "kind": "serial"}}
+    assert "in place of the command" in " ".join(next_steps(serial))
+
+
 def test_an_impossible_arm_is_pointed_out() -> None:
     data = copy.deepcopy(cases.named().to_dict())
     data["plausibility"][0] |= {"holds": False}

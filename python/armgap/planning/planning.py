@@ -316,7 +316,7 @@ def _plan(data: dict[str, Any], arm: Arm, wanted: Sequence[str], duration: float
     setting = Setting.of(data, model)
     search = Search(setting, limits, duration)
     usual = search.usual()
-    builder = HypothesisBuilder(data, usual, _scales(arm, data, limits, usual, setting), model.effects)
+    builder = HypothesisBuilder(data, usual, scales_of(arm, data, limits, usual, setting), model.effects)
     questions, remarks = open_questions(data)
     named = asked(wanted, data, arm)
     tested = []
@@ -394,7 +394,7 @@ def _urgency(tested: TestedQuestion) -> tuple[int, float]:
     return first, -min(tested.consequence, 1e9)
 
 
-def _scales(arm: Arm, data: dict[str, Any], limits: PlanLimits, usual: PredictedMotion, setting: Setting) -> Scales:
+def scales_of(arm: Arm, data: dict[str, Any], limits: PlanLimits, usual: PredictedMotion, setting: Setting) -> Scales:
     edges = {r["variable"]: r["edges"] for r in data.get("regimes") or []}
     n, motion = arm.n_joints, limits.motion
     seen = [edges.get(f"q{j}") or [0.0, 0.0] for j in range(1, n + 1)]

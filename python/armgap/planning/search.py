@@ -290,6 +290,8 @@ class _State:
 
 
 def _worth(outcomes: Sequence[Outcome], threshold: float) -> float:
-    """Return the worth of a motion for several questions, from 0 to 1; the least settled question counts as much as the mean of all."""
-    merits = [x.merit(threshold) for x in outcomes]
-    return 0.5 * (float(np.mean(merits)) + min(merits))
+    """Return the worth of a motion for several questions, from 0 to 1: mean probability that one is settled, and mean merit.
+
+    The merit leads towards evidence where no question is nearly settled. A question that no motion settles changes neither much.
+    """
+    return float(np.mean([0.5 * (x.settled(threshold) + x.merit(threshold)) for x in outcomes]))

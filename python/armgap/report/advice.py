@@ -19,9 +19,17 @@ LISTED = 3
 _EXPORT = "`armgap export DIAGNOSIS.json --arm ARM.toml -o corrected.toml` (`.xml` for MuJoCo, `.urdf` for URDF)"
 _INTO_MODEL = "; `--model ROBOT.urdf -o corrected.urdf` writes them into your own description"
 _AGAIN = "After a repair, diagnose a log of the same motion and compare: `armgap compare DIAGNOSIS.json REPAIRED.json`."
-_LOG_MORE = (
-    "Log more: the measured torque (motor current times torque constant), mapped to the tau columns in place of the command, tells "
-    "whether the gap lies in the drive; note the times of any contact or load."
+_MEASURE_TORQUE = (
+    "Log more: the measured torque (motor current times torque constant), {}, tells whether the gap lies in the drive; note the times of any "
+    "contact or load."
+)
+_BESIDE, _INSTEAD = (
+    "in columns `tau_meas1` and so on beside the command",
+    "mapped to the tau columns in place of the command",
+)
+_TAKE_MEASURED_TORQUE = (
+    "The section on the chain says what arises in the drive. To see the mechanics alone, diagnose again with the measured torque in place of the "
+    "command (`--columns tau1=tau_meas1` and so on for every joint); note the times of any contact or load."
 )
 _OWN = "If you suspect a law, write it as a custom effect and give it to `armgap.diagnose(..., effects=[...])`."
 
@@ -74,9 +82,9 @@ def _effect(data: Data) -> list[str]:
     steps.append(_AGAIN)
     if leaves_part(data):
         left = float(data["gap"]["unexplained"])
-        steps.append(f"The causes leave {percent(left)} of the gap of the re-estimated arm file. {_LOG_MORE}")
+        steps.append(f"The causes leave {percent(left)} of the gap of the re-estimated arm file. {_log_more(data)}")
     elif doubtful(data):
-        steps.append(_LOG_MORE)
+        steps.append(_log_more(data))
     return steps
 
 
@@ -97,7 +105,14 @@ def _unexplained(data: Data) -> list[str]:
         ]
     places = data.get("where") or []
     steps = [f"Look at joint {places[0]['joint']} first: that is where the torque is lacking."] if places else []
-    return [*steps, _LOG_MORE, *([] if _is_serial(data) else [_OWN]), *_excite(data)]
+    return [*steps, _log_more(data), *([] if _is_serial(data) else [_OWN]), *_excite(data)]
+
+
+def _log_more(data: Data) -> str:
+    """Return what to log beside these signals, or how to use the measured torque where the logs hold it."""
+    if any(part["stage"] == "drive" for part in data.get("chain") or []):
+        return _TAKE_MEASURED_TORQUE
+    return _MEASURE_TORQUE.format(_INSTEAD if _is_serial(data) else _BESIDE)
 
 
 def _excite(data: Data) -> list[str]:
