@@ -15,6 +15,7 @@ use crate::search::belief::Cause;
 use crate::search::model_search::{Attribution, refresh};
 use armgap_core::arm::Arm;
 use armgap_core::effect::{NEVER, Trial};
+use nalgebra::{DMatrix, DVector};
 
 /// Probability below which a cause is not named.
 const NAMEABLE: f64 = 0.3;
@@ -89,9 +90,7 @@ fn impossible(effect: &EffectInstance, probability: f64) -> Option<String> {
 /// the whole effect with its absence.
 fn uncertain(effect: &EffectInstance, sigma: &[f64]) -> Option<String> {
     let spec = effect.law.spec();
-    // For an effect tested along a ray (`Trial::Ray`) all values tend to zero together, and the first one is the size.
-    let count = if spec.trial == Trial::Ray { 1 } else { effect.amplitudes() };
-    let amplitudes = spec.parameters.iter().zip(effect.p).zip(sigma).take(count);
+    let amplitudes = spec.parameters.iter().zip(effect.p).zip(sigma).take(sizes(effect));
     let deviations = amplitudes.map(|((parameter, value), sigma)| {
         let neutral = if parameter.neutral < NEVER { parameter.neutral } else { 0.0 };
         ((value - neutral).abs(), *sigma)
@@ -122,9 +121,45 @@ fn sorted<T>(
     (named, rest)
 }
 
-/// At most `most` causes to be named, and the rest with the reasons why they are not.
-fn sorted_causes(causes: &[Cause], most: usize) -> (Vec<Cause>, Vec<Unnamed<Cause>>) {
-    sorted(causes.to_vec(), most, |c| unfit(&c.effect, &c.sigma, c.probability))
+/// At most `most` of a search's causes to be named, and the rest with the reasons why they are not.
+fn sorted_causes<const N: usize, const P: usize>(
+    attribution: &Attribution<N, P>,
+    most: usize,
+) -> (Vec<Cause>, Vec<Unnamed<Cause>>) {
+    let why_not = |c: &Cause| {
+        let part = part_at_its_shape(&attribution.model, &c.effect);
+        let sigma: Vec<f64> = c.sigma.iter().map(|sigma| sigma * part).collect();
+        unfit(&c.effect, &sigma, c.probability)
+    };
+    sorted(attribution.causes.clone(), most, why_not)
+}
+
+/// Standard deviation of an effect's size at given values of its shape, as a part of its standard deviation; 1 if the effect has no shape, or the model does
+/// not have the effect.
+///
+/// Where a size and a shape are fitted together, as the amplitude and the time constant of a friction that warms up slowly, the size alone may take any
+/// value and the effect is certain nevertheless: whether there is one is asked at its shape.
+fn part_at_its_shape<const P: usize>(model: &Fit<P>, effect: &EffectInstance) -> f64 {
+    let effects = &model.hypothesis.effects;
+    let Some(place) = effects.iter().position(|e| e.same_place(effect)) else { return 1.0 };
+    let size = P + effects[..place].iter().map(EffectInstance::len).sum::<usize>();
+    let shape: Vec<usize> = (size + sizes(effect)..size + effect.len()).collect();
+    conditional_part(&model.covariance.matrix, size, &shape)
+}
+
+/// Number of leading values of an effect that are sizes: for an effect tested along a ray (`Trial::Ray`) all values tend to zero together, and the first
+/// one is the size.
+fn sizes(effect: &EffectInstance) -> usize {
+    if effect.law.spec().trial == Trial::Ray { 1 } else { effect.amplitudes() }
+}
+
+/// Standard deviation of value `one` at given values `others`, as a part of its standard deviation, from a covariance; 1 where that is singular.
+fn conditional_part(covariance: &DMatrix<f64>, one: usize, others: &[usize]) -> f64 {
+    let among = DMatrix::from_fn(others.len(), others.len(), |i, j| covariance[(others[i], others[j])]);
+    let with_one = DVector::from_fn(others.len(), |i, _| covariance[(others[i], one)]);
+    let Some(factor) = among.cholesky() else { return 1.0 };
+    let explained = with_one.dot(&factor.solve(&with_one)) / covariance[(one, one)];
+    if explained.is_finite() { (1.0 - explained).clamp(0.0, 1.0).sqrt() } else { 1.0 }
 }
 
 /// Adds the squared biases of a cause's values to their variances.
@@ -157,7 +192,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     pub fn headline(&mut self, conclusion: Conclusion<N, P>, most: usize) -> Headline<N, P> {
         let Conclusion { mut attribution, alone, mut disturbances } = conclusion;
         self.weigh(&mut attribution);
-        let (mut causes, mut candidates) = sorted_causes(&attribution.causes, most);
+        let (mut causes, mut candidates) = sorted_causes(&attribution, most);
         let pushes_allowed = if most > 0 { usize::MAX } else { 0 };
         disturbances.sort_by(|a, b| b.clarity().total_cmp(&a.clarity()));
         let (disturbances, disturbance_candidates) =
@@ -168,7 +203,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             self.take_all_windows();
             self.set_pushes(&[]);
             self.weigh(&mut attribution);
-            (causes, candidates) = sorted_causes(&attribution.causes, most);
+            (causes, candidates) = sorted_causes(&attribution, most);
             changed = false;
         }
         self.set_pushes(&disturbances);
@@ -306,6 +341,18 @@ mod tests {
             let why = unfit(&effect(name, p), &sigma, probability);
             assert_eq!(why.is_none(), fit, "{name} {p:?} {sigma:?} {probability}: {why:?}");
         }
+    }
+
+    #[test]
+    fn a_size_is_surer_at_a_given_shape() {
+        let covariance = DMatrix::from_row_slice(3, 3, &[9.0, 0.0, 0.0, 0.0, 4.0, 5.7, 0.0, 5.7, 9.0]);
+        let correlation: f64 = 5.7 / (2.0 * 3.0);
+        let part = conditional_part(&covariance, 1, &[2]);
+        assert!((part - (1.0 - correlation * correlation).sqrt()).abs() < 1e-12, "{part}");
+        assert_eq!(conditional_part(&covariance, 1, &[0]), 1.0, "not correlated");
+        assert_eq!(conditional_part(&covariance, 1, &[]), 1.0, "no shape");
+        let unknown = DMatrix::from_diagonal_element(2, 2, f64::INFINITY);
+        assert_eq!(conditional_part(&unknown, 0, &[1]), 1.0);
     }
 
     #[test]

@@ -135,9 +135,11 @@ impl<const N: usize, const P: usize> SearchNode<N, P> {
         (is_near && !self.excludes(best, other)) || best.z_over(other) < 1.0
     }
 
-    /// Whether candidate `best` shows that candidate `other` is not the cause: it leaves no more than noise, and `other` significantly more.
+    /// Whether candidate `best` shows that candidate `other` is not the cause: it leaves no more than noise, and `other` significantly more, on the mean of
+    /// all windows or far out of the noise in some.
     pub fn excludes(&self, best: &Candidate<P>, other: &Candidate<P>) -> bool {
-        excludes(best.holdout.iter().sum(), self.floor, best.z_over(other))
+        let left = best.holdout.iter().sum();
+        excludes(left, self.floor, best.z_over(other), self.takes_outliers(best, other))
     }
 
     /// Whether a candidate explains windows whose errors stand far out of the noise, in the training logs and in the holdout, while no other window
@@ -187,10 +189,11 @@ impl<const N: usize, const P: usize> SearchNode<N, P> {
 }
 
 /// Whether a candidate that leaves the cost `left` on the holdout, over a floor of `floor`, shows that another one is not the cause, whose windows'
-/// costs are higher by `z` standard errors of their mean difference. Beside unmodelled torques a small difference of the costs decides nothing: these
-/// torques are alike in all windows. Beside noise alone it does.
-fn excludes(left: f64, floor: f64, z: f64) -> bool {
-    left < AT_FLOOR * floor && z > CLOSE
+/// costs are higher by `z` standard errors of their mean difference, or in some windows far out of the noise (`has_outliers`). Beside unmodelled torques a
+/// small difference of the costs decides nothing: these torques are alike in all windows. Beside noise alone it does, and how much noise there is
+/// is known, so that windows need not agree: a motion may tell two effects apart in a few of them.
+fn excludes(left: f64, floor: f64, z: f64, has_outliers: bool) -> bool {
+    left < AT_FLOOR * floor && (z > CLOSE || has_outliers)
 }
 
 /// Whether the window costs `mine` are lower than `base` by more than `least`, summed over the windows that improve, and hardly higher, summed over
@@ -388,9 +391,10 @@ mod tests {
 
     #[test]
     fn a_small_difference_decides_beside_noise_alone() {
-        assert!(excludes(110.0, 100.0, 5.0));
-        assert!(!excludes(110.0, 100.0, 2.5), "no significant difference");
-        assert!(!excludes(500.0, 100.0, 5.0), "beside unmodelled torques");
+        assert!(excludes(110.0, 100.0, 5.0, false));
+        assert!(!excludes(110.0, 100.0, 2.5, false), "no significant difference");
+        assert!(excludes(110.0, 100.0, 2.5, true), "few windows, far out of the noise");
+        assert!(!excludes(500.0, 100.0, 5.0, true), "beside unmodelled torques");
     }
 
     #[test]
