@@ -100,8 +100,12 @@ def test_a_spring_with_a_far_off_rest_position_imitates_an_offset(builder):
     assert posed is not None
     target = builder._usual.difference(posed.pair)
     whole, _ = builder._usual.left_of(target)
-    ((left, spring),) = builder._imitators(("joint_spring", 1), (), target)
-    by_size, _ = builder._usual.left_of(target, builder._usual.imitations(spring, ())[0])
-    # Friction that holds and lets go is not linear in an offset: a part is left.
-    assert left < 0.2 * whole
+    (spring,) = builder._imitators.starts(("joint_spring", 1), (), target)
+    by_size, _ = builder._usual.left_of(target, builder._usual.change(spring, ()))
     assert by_size > 0.9 * whole
+    # Friction that holds and lets go is not linear in an offset: a part is left.
+    assert builder._imitators.least_left(("joint_spring", 1), (), target) < 0.2 * whole
+    fitted = builder._imitators.best([spring], (), target)
+    left, _ = builder._usual.left_of(target - builder._usual.change(fitted, ()))
+    assert left < 0.01 * whole
+    assert fitted.parameters["k"] * (0.0 - fitted.parameters["q0"]) == pytest.approx(-0.1, rel=0.3)

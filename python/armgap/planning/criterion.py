@@ -192,6 +192,7 @@ class PredictedMotion:
         self._basis: Array = polynomials[:, 2:]
         self._weights: dict[Rest, tuple[Array, Array]] = {}
         self._columns: Array | None = None
+        self._remainder: tuple[Array, Array] | None = None
 
     def _weights_of(self, rest: Rest) -> tuple[Array, Array]:
         if rest not in self._weights:
@@ -372,11 +373,23 @@ class PredictedMotion:
             If the arm with the effect cannot be predicted along the motion.
         """
         pair = HypothesisPair((), (*rival, effect), effect)
-        lead = latent(pair.rival)
-        theta = self._setting.model.theta
-        change = self.predicted(theta, pair.rival, lead) - self.predicted(theta, rival, lead)
-        _, by_value = self._of_rival(pair, lead)
-        return [change, *by_value.T]
+        _, by_value = self._of_rival(pair, latent(pair.rival))
+        return [self.change(effect, rival), *by_value.T]
+
+    def change(self, effect: EffectInstance, rival: tuple[EffectInstance, ...]) -> Array:
+        """Return the change of the predictions by an effect beside the effects `rival`; errors as :meth:`imitations`."""
+        return self._difference((*rival, effect), HypothesisPair((), rival))[0]
+
+    def remainder(self, delta: Array) -> Array:
+        """Return what a fit of the values common to all models leaves of a difference, and of those values, in standard deviations."""
+        if self._remainder is None:
+            _, whole = self._weights_of(self._setting.rest)
+            common = self.sensitivities()
+            stacked = np.vstack([common * whole[:, None], np.eye(common.shape[1])])
+            self._remainder = whole, np.linalg.qr(stacked)[0]
+        whole, basis = self._remainder
+        padded = np.concatenate([delta * whole, np.zeros(basis.shape[1])])
+        return np.asarray(padded - basis @ (basis.T @ padded))
 
     def _difference(self, effects: tuple[EffectInstance, ...], pair: HypothesisPair) -> tuple[Array, bool]:
         lead = latent((*effects, *pair.rival))
@@ -397,7 +410,8 @@ class PredictedMotion:
         first = self._windows < TRAINED * self._every
         trained = np.repeat(first, len(delta) // self._count)
         best = columns.fitted(delta, whole * trained)
-        plain = 0.5 * float(np.sum((delta * whole) ** 2))
+        absent = self.predicted(theta, tuple(e for e in pair.rival if e != pair.free), lead)
+        plain = 0.5 * float(np.sum(((truth - absent) * whole) ** 2))
         for _ in range(steps):
             # Gauss-Newton: the rival predicts with the fitted values, and the remaining difference is fitted again.
             changed, rival = self._moved(pair, columns, best.values)

@@ -33,8 +33,8 @@ class Outcome(NamedTuple):
     Attributes
     ----------
     fitted, plain : ndarray
-        Expected log-likelihood ratio over the windows that a diagnosis fits to, with the rival fitted, and over all windows with the rival
-        not fitted.
+        Expected log-likelihood ratio over the windows that a diagnosis fits to, with the rival fitted, and over all windows against the absence of
+        the effect, with nothing fitted.
     above : ndarray
         Cost of the fitted rival above the noise, over the threshold of a diagnosis; the smaller of the values for training and holdout
         windows.
@@ -83,7 +83,7 @@ class Outcome(NamedTuple):
 
     @property
     def kept(self) -> float:
-        """Part of the difference between two models that remains after the rival is fitted."""
+        """Part of the difference that the effect makes that remains after the rival is fitted."""
         plain = float(self.weight @ self.plain)
         return self.expected / plain if plain > 0 else 0.0
 

@@ -47,10 +47,11 @@ MOST_QUESTIONS, MOST_PAIRS = 5, 10
 DECISION = 3.0
 #: Expected log-likelihood ratio below which evidence counts as none.
 NEXT_TO_NOTHING = 1.0
-#: Part of the difference between two models, left after the rival is fitted, below which the models are equivalent.
+#: Part of the difference that an effect makes, left after the rival is fitted, below which the models are equivalent.
 SAME = 1e-3
-#: Part of the difference between two models, left by a fit of all values, below which they are identical: rounding and the last step leave as much.
-IDENTICAL = 1e-5
+#: Part of the difference that an effect makes, left by a fit of all values of another one, below which the two are identical. Rounding leaves
+#: 1e-20; a hardening spring, which larger motions tell from a tilted base, was seen to leave 2e-6.
+IDENTICAL = 1e-10
 #: Largest number of effects that are tried as imitations of an effect in question.
 _TRIED = 8
 SCHEMA = "armgap.plan/1"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from armgap import _native
 from armgap.evidence.hypothesis import EffectInstance, at_motor
 from armgap.planning.criterion import HypothesisPair, PredictedMotion, Rest
+from armgap.planning.open_questions.imitators import Imitators
 from armgap.planning.open_questions.questions import NONE, Question, inseparable
 from armgap.planning.open_questions.sizes import PLANNED, Scales, Shape, levels, shapes
 
@@ -85,6 +86,7 @@ class HypothesisBuilder:
         self._scales = scales
         self._base = base
         self._specs = {entry["name"]: entry["parameters"] for entry in _native.effects()}
+        self._imitators = Imitators(usual, scales, self._specs)
         self._floor = np.array(data["gap"]["floor"], dtype=np.float64)
 
     def pose(self, question: Question) -> TestedQuestion | None:
@@ -146,7 +148,7 @@ class HypothesisBuilder:
                 continue
             if frozenset((tested.question.place, place)) in same:
                 continue
-            left = min((x for x, _ in self._imitators(place, tested.pair.rival, target)), default=math.inf)
+            left = self._imitators.least_left(place, tested.pair.rival, target)
             if left < IMITATES * whole:
                 found.append((left, replace(tested.question, against=place[0], against_joint=place[1])))
         return [question for _, question in sorted(found, key=lambda x: x[0])]
@@ -159,9 +161,9 @@ class HypothesisBuilder:
             return self._estimated(question)
         if not known:
             values = levels(*question.place, self._scales)
-            return _even(self._instance(question.place, v) for v in values)
+            return _even(self._imitators.instance(question.place, v) for v in values)
         found = [
-            (_likelihood(question, shape, size), self._instance(question.place, shape.at(size)))
+            (_likelihood(question, shape, size), self._imitators.instance(question.place, shape.at(size)))
             for shape in known
             for size in self._sizes(question, shape, without)
         ]
@@ -181,14 +183,6 @@ class HypothesisBuilder:
         specs = self._specs[question.effect]
         sizes = [question.estimate[s["name"]] for s in specs if s["unit"] == specs[0]["unit"]]
         return any(abs(value - known[0].neutral) > DETERMINED * sigma for value, sigma in sizes)
-
-    def _instance(self, place: tuple[str, int | None], values: Mapping[str, float]) -> EffectInstance:
-        """Return an effect with values kept within the bounds of its parameters: small and slow motions suggest some beyond them."""
-        bounds = {spec["name"]: (spec["lower"], spec["upper"]) for spec in self._specs[place[0]]}
-        kept = {
-            name: min(max(v, bounds[name][0]), bounds[name][1]) if name in bounds else v for name, v in values.items()
-        }
-        return EffectInstance(*place, kept)
 
     def _estimated(self, question: Question) -> list[tuple[float, EffectInstance]]:
         """Return weighted effects at the quadrature nodes of the estimate's normal distribution."""
@@ -213,7 +207,7 @@ class HypothesisBuilder:
 
     def _sizes(self, question: Question, shape: Shape, without: tuple[EffectInstance, ...]) -> Array:
         """Return sizes of the effect from the smallest that matters, up to its bound if one is known."""
-        effect = self._instance(question.place, shape.at(shape.typical))
+        effect = self._imitators.instance(question.place, shape.at(shape.typical))
         floors = self._usual.floors(HypothesisPair(((1.0, (*without, effect)),), without), 0, self._floor)
         matters = shape.typical * (SEVERAL / floors if floors > 0 else 1.0)
         matters = min(max(matters, shape.typical / 1e4), shape.typical * _TRIED_SIZE_RATIO)
@@ -224,50 +218,14 @@ class HypothesisBuilder:
         )
 
     def _rival(self, question: Question, rough: HypothesisPair) -> EffectInstance:
-        """Return the rival effect with the diagnosis' values or with others, whichever best imitate the effect over the usual motion."""
+        """Return the rival effect with the values that best imitate the effect over the usual motion."""
         middle = rough.alternatives[len(rough.alternatives) // 2]
         target = self._usual.difference(HypothesisPair((middle,), rough.rival))
-        found = list(self._imitators(question.rival, rough.rival, target))
+        starts = list(self._imitators.starts(question.rival, rough.rival, target))
         for entry in self._entries(question.rival)[:1]:
             values = {name: float(p["value"]) for name, p in entry["parameters"].items()}
-            effect = EffectInstance(*question.rival, {**values, **at_motor(entry.get("sides"))})
-            found += self._left_beside(effect, rough.rival, target)
-        if not found:
-            raise ValueError(f"{question.text}: the rival cannot be predicted")
-        return min(found, key=lambda x: x[0])[1]
-
-    def _left_beside(
-        self, effect: EffectInstance, without: tuple[EffectInstance, ...], target: Array
-    ) -> list[tuple[float, EffectInstance]]:
-        """Return an effect with the square of what a first-order fit of all its values leaves of `target`; nothing if not computable."""
-        try:
-            return [(self._usual.left_of(target, *self._usual.imitations(effect, without))[0], effect)]
-        except ValueError:
-            return []
-
-    def _imitators(
-        self, place: tuple[str, int | None], without: tuple[EffectInstance, ...], target: Array
-    ) -> Iterable[tuple[float, EffectInstance]]:
-        """Yield instances of an effect, one per shape or level, each with the square of what it may leave of the difference `target`.
-
-        That is left by a fit of all values of the effect, to first order, and of the arm's: a spring with a far-off rest position is an offset. The
-        instance has the size that fits the target best by itself, or the typical one where that is not possible.
-        """
-        spec = self._specs[place[0]][0]
-        for shape in shapes(*place, self._scales):
-            typical = self._instance(place, shape.at(shape.typical))
-            try:
-                columns = self._usual.imitations(typical, without)
-            except ValueError:
-                continue
-            left, _ = self._usual.left_of(target, *columns)
-            size = float(self._usual.left_of(target, columns[0])[1][0]) * shape.typical
-            is_possible = (size > 0 or not shape.inverse) and spec["lower"] <= shape.at(size)[shape.main] <= spec[
-                "upper"
-            ]
-            yield left, self._instance(place, shape.at(size)) if is_possible else typical
-        for level in levels(*place, self._scales) if not shapes(*place, self._scales) else ():
-            yield from self._left_beside(self._instance(place, level), without, target)
+            starts.append(EffectInstance(*question.rival, {**values, **at_motor(entry.get("sides"))}))
+        return self._imitators.best(starts, rough.rival, target)
 
     def _range(self, question: Question, effects: list[EffectInstance]) -> tuple[str, float, float] | None:
         name = self._specs[question.effect][0]["name"]
