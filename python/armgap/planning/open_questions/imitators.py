@@ -15,7 +15,7 @@ from armgap.planning.open_questions.sizes import Scales, levels, shapes
 __all__ = ["Imitators"]
 
 Array = NDArray[np.float64]
-Place = tuple[str, int | None]
+EffectOnJoint = tuple[str, int | None]
 Effects = tuple[EffectInstance, ...]
 
 #: Largest number of evaluations, per value, of the fit of an effect to what another one changes.
@@ -40,7 +40,7 @@ class Imitators:
         self._scales = scales
         self._specs = specs
 
-    def instance(self, place: Place, values: Mapping[str, float]) -> EffectInstance:
+    def instance(self, place: EffectOnJoint, values: Mapping[str, float]) -> EffectInstance:
         """Return an effect with values kept within the bounds of its parameters: small and slow motions suggest some beyond them."""
         bounds = {spec["name"]: (spec["lower"], spec["upper"]) for spec in self._specs[place[0]]}
         kept = {
@@ -48,7 +48,7 @@ class Imitators:
         }
         return EffectInstance(*place, kept)
 
-    def starts(self, place: Place, without: Effects, target: Array) -> Iterable[EffectInstance]:
+    def starts(self, place: EffectOnJoint, without: Effects, target: Array) -> Iterable[EffectInstance]:
         """Yield instances of an effect: per shape the one of the size that best fits the difference `target`, or of typical size; or its levels."""
         known = shapes(*place, self._scales)
         for shape in known:
@@ -66,7 +66,7 @@ class Imitators:
         for level in () if known else levels(*place, self._scales):
             yield self.instance(place, level)
 
-    def least_left(self, place: Place, without: Effects, target: Array) -> float:
+    def least_left(self, place: EffectOnJoint, without: Effects, target: Array) -> float:
         """Return the least square that an effect may leave of a difference, by first-order fits of all its values and the arm's.
 
         A spring with a far-off rest position is an offset: the size alone would not tell. Infinite if the effect cannot be predicted.

@@ -16,7 +16,7 @@ from armgap.planning.open_questions.sizes import PLANNED
 __all__ = ["NONE", "Question", "asked", "known_model", "open_questions"]
 
 Data = dict[str, Any]
-Place = tuple[str, int | None]
+EffectOnJoint = tuple[str, int | None]
 NONE = "none"
 """Word that stands in place of a rival effect where the question is whether an effect is present or absent."""
 
@@ -52,7 +52,7 @@ class Question:
     origin: str = "asked"
     estimate: dict[str, tuple[float, float]] | None = None
     bound: float | None = None
-    replaced: frozenset[Place] = frozenset()
+    replaced: frozenset[EffectOnJoint] = frozenset()
     why: str = ""
 
     @property
@@ -193,7 +193,7 @@ def _against_absence(effect: str, joint: int | None, data: Data) -> Question:
     )
 
 
-def _is_alternative(place: Place, cause: Data, entries: list[Data]) -> bool:
+def _is_alternative(place: EffectOnJoint, cause: Data, entries: list[Data]) -> bool:
     """Return whether an effect would be in the place of a named cause: it is among the cause's equivalents, or its entry says so."""
     equivalents = [(other["effect"], other["joint"]) for other in cause["equivalents"]]
     return place in equivalents or any(_would_stand_for(entry, cause) for entry in entries)
