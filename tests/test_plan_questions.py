@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
@@ -67,6 +68,14 @@ def test_an_estimate_that_may_be_none_weighs_sizes_by_their_likelihood(builder):
     by_size = {size: weight for weight, size in doubted}
     assert by_size[smallest] > 100.0 * by_size[largest] > 0.0
     assert sum(by_size.values()) == pytest.approx(1.0)
+
+
+def test_an_estimate_without_a_known_scatter_is_taken_as_it_is_or_not_at_all(builder, monkeypatch):
+    flat = sizes(builder, 0.0, math.inf)
+    assert all(weight == pytest.approx(1.0 / len(flat)) for weight, _ in flat)
+    cause = fitted("torque_offset", {"offset": (0.1, math.inf)})
+    monkeypatch.setitem(builder._data, "causes", [cause])
+    assert sizes(builder, 0.1, math.inf) == [(1.0, 0.1)]
 
 
 def test_an_effect_in_place_of_a_cause_has_the_size_of_its_fit_and_replaces_the_cause(limited):

@@ -193,8 +193,11 @@ class HypothesisBuilder:
         value, sigma = question.estimate[name]
         sides = next((at_motor(c.get("sides")) for c in self._entries(question.place)), {})
         found = []
-        for node, weight in zip(NODES, WEIGHTS, strict=True):
-            if question.effect == "joint_elasticity":
+        nodes = zip(NODES, WEIGHTS, strict=True) if math.isfinite(sigma) else ((0.0, 1.0),)
+        for node, weight in nodes:
+            if node == 0.0:
+                at = value
+            elif question.effect == "joint_elasticity":
                 at = value * math.exp(node * min(sigma / max(abs(value), 1e-300), SPREAD))
             else:
                 at = min(max(value + node * sigma, spec["lower"]), spec["upper"])
@@ -238,10 +241,10 @@ def _likelihood(question: Question, shape: Shape, size: float) -> float:
     if question.estimate is None:
         return 1.0
     value, sigma = question.estimate[shape.main]
+    if sigma <= 0 or (shape.inverse and value <= 0):
+        return 1.0
     if shape.inverse:
         value, sigma = 1.0 / value, sigma / value**2
-    if sigma <= 0:
-        return 1.0
     places = [(sign * size + shape.neutral - value) / sigma for sign in (1.0, -1.0)]
     return max(0.5 * sum(math.exp(-0.5 * x * x) for x in places), LEAST_LIKELY)
 

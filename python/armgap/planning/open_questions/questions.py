@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -220,7 +221,9 @@ def _parse(text: str, arm: Arm) -> tuple[str, int | None]:
 
 
 def _estimate(entry: Data) -> dict[str, tuple[float, float]]:
-    return {name: (float(p["value"]), float(p["sigma"])) for name, p in entry["parameters"].items()}
+    """Return value and standard deviation of each parameter of an entry; JSON has null for one that is infinite."""
+    sigma = {name: math.inf if p["sigma"] is None else float(p["sigma"]) for name, p in entry["parameters"].items()}
+    return {name: (float(p["value"]), sigma[name]) for name, p in entry["parameters"].items()}
 
 
 def _bound(entry: Data) -> float | None:
