@@ -51,14 +51,15 @@ def hypotheses(plan: armgap.Plan) -> list[tuple[str, int | None, tuple[str, floa
 def played(case: Case, arm: TrialArm, plan: armgap.Plan, seed: int) -> Iterator[dict[str, object]]:
     """Play the planned motion on arms with each effect of the open questions in turn; yield the effect, its values and shares of limits used.
 
-    An effect with which the arm could not follow the first, small motion is left out: the first log would have looked different.
+    An effect with which the arm could not follow the first, small motion is left out: the first log would have looked different. So is one so
+    small that the simulator has no arm for it, as with a rotor without mass.
     """
     reference = Reference(plan.q_ref, plan.dq_ref, plan.tau_ff)
     bare = play(case, arm, reference, hidden=False)
     for number, (effect, joint, largest) in enumerate(hypotheses(plan)):
         rng = np.random.default_rng([seed, number])
         index = (joint or 1) - 1
-        with suppress(NoTravelError):
+        with suppress(NoTravelError, ValueError):
             values = REGISTRY[effect].draw(Draw(rng, float(rng.uniform()), arm, index, usage([bare], index)))
             if largest is not None and abs(values.get(largest[0], 0.0)) > largest[1]:
                 values[largest[0]] = float(np.copysign(largest[1], values[largest[0]]))
