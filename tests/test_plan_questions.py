@@ -78,6 +78,14 @@ def test_an_estimate_without_a_known_scatter_is_taken_as_it_is_or_not_at_all(bui
     assert sizes(builder, 0.1, math.inf) == [(1.0, 0.1)]
 
 
+def test_a_spring_of_any_stiffness_has_the_torque_that_the_diagnosis_saw(builder):
+    posed = builder.pose(Question("joint_spring", 1, estimate={"k": (0.05, 0.4), "q0": (-2.0, 20.0)}))
+    assert posed is not None
+    springs = [effects[-1].parameters for _, effects in posed.pair.alternatives]
+    assert len({spring["k"] for spring in springs}) == len(springs) > 1
+    assert all(spring["k"] * spring["q0"] == pytest.approx(-0.1) for spring in springs)
+
+
 def test_an_effect_in_place_of_a_cause_has_the_size_of_its_fit_and_replaces_the_cause(limited):
     cause = fitted("torque_offset", {"offset": (0.1, 0.01)})
     same = {"effect": "coulomb_asymmetry", "joint": 1, "motion_separates": False}

@@ -352,6 +352,15 @@ class PredictedMotion:
         rms = np.sqrt(np.sum(factors**2, axis=(0, 1)) / (self._count * (self._samples + 1)))
         return float(np.max(rms / np.maximum(floor, 1e-12)))
 
+    def unfitted(self, pair: HypothesisPair) -> float:
+        """Return the log-likelihood ratio of the pair's first model and the rival with nothing fitted; zero if not computable."""
+        try:
+            delta = self.difference(pair)
+        except ValueError:
+            return 0.0
+        _, whole = self._weights_of(pair.rest or self._setting.rest)
+        return 0.5 * self._share * float(np.sum((delta * whole) ** 2))
+
     def difference(self, pair: HypothesisPair) -> Array:
         """Return the difference of predictions between the pair's first model and the rival."""
         return self._difference(pair.alternatives[0][1], pair)[0]

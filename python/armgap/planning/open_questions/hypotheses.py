@@ -22,9 +22,10 @@ __all__ = ["HypothesisBuilder", "TestedQuestion"]
 Array = NDArray[np.float64]
 Data = dict[str, Any]
 
-#: Change of predictions by an effect, in noise floors, from which the effect matters.
-SEVERAL = 3.0
-#: Ratio of the largest to the smallest size of an effect that is tried, upwards from the size that matters or downwards from a known bound.
+#: Log-likelihood ratio of an effect and its absence on a usual motion, with nothing fitted, from which the effect is tried: about ten times what
+#: decides, as a fit of the arm's values takes most of it.
+DETECTABLE = 100.0
+#: Ratio of the largest to the smallest size of an effect that is tried, upwards from a detectable one or downwards from a known bound.
 _TRIED_SIZE_RATIO = 10.0
 #: Number of sizes of an effect that are tried.
 SIZES = 5
@@ -162,6 +163,8 @@ class HypothesisBuilder:
         if not known:
             values = levels(*question.place, self._scales)
             return _even(self._imitators.instance(question.place, v) for v in values)
+        if question.estimate is not None:
+            known = [shape.beside(question.estimate) for shape in known]
         found = [
             (_likelihood(question, shape, size), self._imitators.instance(question.place, shape.at(size)))
             for shape in known
@@ -209,16 +212,14 @@ class HypothesisBuilder:
         return [e for e in entries if (e["effect"], e["joint"]) == place]
 
     def _sizes(self, question: Question, shape: Shape, without: tuple[EffectInstance, ...]) -> Array:
-        """Return sizes of the effect from the smallest that matters, up to its bound if one is known."""
+        """Return sizes of the effect from one that a usual motion may show, up to its bound if one is known: where larger ones show, all do."""
         effect = self._imitators.instance(question.place, shape.at(shape.typical))
-        floors = self._usual.floors(HypothesisPair(((1.0, (*without, effect)),), without), 0, self._floor)
-        matters = shape.typical * (SEVERAL / floors if floors > 0 else 1.0)
-        matters = min(max(matters, shape.typical / 1e4), shape.typical * _TRIED_SIZE_RATIO)
+        evidence = self._usual.unfitted(HypothesisPair(((1.0, (*without, effect)),), without))
+        least = shape.typical * (math.sqrt(DETECTABLE / evidence) if evidence > 0 else 1.0)
+        least = min(max(least, shape.typical / 1e4), shape.typical * _TRIED_SIZE_RATIO)
         if question.bound is None or shape.inverse:
-            return np.geomspace(matters, _TRIED_SIZE_RATIO * matters, SIZES)
-        return np.geomspace(
-            max(min(matters, question.bound), question.bound / _TRIED_SIZE_RATIO), question.bound, SIZES
-        )
+            return np.geomspace(least, _TRIED_SIZE_RATIO * least, SIZES)
+        return np.geomspace(max(min(least, question.bound), question.bound / _TRIED_SIZE_RATIO), question.bound, SIZES)
 
     def _rival(self, question: Question, rough: HypothesisPair) -> EffectInstance:
         """Return the rival effect with the values that best imitate the effect over the usual motion."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -92,6 +92,8 @@ class Shape:
         Size that matters on most arms, in SI units.
     others : dict of str to float
         Values of the other parameters, which are fixed [SI].
+    products : dict of str to float
+        Values of other parameters times the size, which are fixed [SI].
     neutral : float
         Value of the parameter at which there is no effect [SI].
     inverse : bool
@@ -101,13 +103,23 @@ class Shape:
     main: str
     typical: float
     others: dict[str, float] = field(default_factory=dict)
+    products: dict[str, float] = field(default_factory=dict)
     neutral: float = 0.0
     inverse: bool = False
 
     def at(self, size: float) -> dict[str, float]:
         """Return the parameters of the effect for a given size [SI]."""
         value = 1.0 / size if self.inverse else self.neutral + size
-        return {self.main: value, **self.others}
+        return {self.main: value, **self.others, **{name: product / size for name, product in self.products.items()}}
+
+    def beside(self, estimate: dict[str, tuple[float, float]]) -> Shape:
+        """Return the shape with what a diagnosis' estimate of the effect, values and standard deviations, tells of it at any size.
+
+        Small motions tell the torque of a spring near where they are, stiffness times rest position, and not the stiffness.
+        """
+        if (self.main, *self.others) != ("k", "q0"):
+            return self
+        return replace(self, others={}, products={"q0": estimate["k"][0] * estimate["q0"][0]})
 
 
 def _one(
