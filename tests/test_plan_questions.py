@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 import armgap
-from armgap import Arm, simulate
+from armgap import Arm, Diagnosis, simulate
 from armgap.arm import MotionLimits
+from armgap.planning import planning, search
 from armgap.planning.criterion import Setting
 from armgap.planning.limits import limits_of
 from armgap.planning.open_questions.hypotheses import HypothesisBuilder
@@ -35,10 +36,14 @@ def limited(pendulum: Arm) -> Arm:
 
 
 @pytest.fixture(scope="module")
-def builder(limited: Arm) -> HypothesisBuilder:
+def diagnosis(limited: Arm) -> Diagnosis:
     t = limited.sample_period * np.arange(round(3.0 / limited.sample_period))
-    log = simulate(limited, t, 0.5 * np.sin(4.0 * t)[:, None], name="slow")
-    data = armgap.diagnose(log, limited).to_dict() | {"ranking": []}
+    return armgap.diagnose(simulate(limited, t, 0.5 * np.sin(4.0 * t)[:, None], name="slow"), limited)
+
+
+@pytest.fixture(scope="module")
+def builder(limited: Arm, diagnosis: Diagnosis) -> HypothesisBuilder:
+    data = diagnosis.to_dict() | {"ranking": []}
     limits = limits_of(limited, data)
     model, _ = known_model(data, limited)
     setting = Setting.of(data, model)
@@ -126,3 +131,16 @@ def test_a_spring_with_a_far_off_rest_position_imitates_an_offset(builder):
     left, _ = builder._usual.left_of(target - builder._usual.change(fitted, ()))
     assert left < 0.01 * whole
     assert fitted.parameters["k"] * (0.0 - fitted.parameters["q0"]) == pytest.approx(-0.1, rel=0.3)
+
+
+def test_causes_with_which_the_arm_diverges_are_left_out_and_said(limited, diagnosis, monkeypatch):
+    """A drag that is negative beyond the diagnosed speeds speeds the arm up."""
+    model, _ = known_model(diagnosis.to_dict(), limited)
+    drag = armgap.evidence.hypothesis.EffectInstance("cubic_drag", 1, {"c3": -50.0})
+    monkeypatch.setattr(planning, "known_model", lambda *_: (model.only((drag,)), ()))
+    monkeypatch.setattr(search, "GENERATIONS", 0)
+    made = armgap.plan(diagnosis, limited, questions=["quadratic_drag:1"], duration=2.0)
+    assert any("without cubic_drag:1: with the diagnosed values the arm diverges" in note for note in made.notes)
+    monkeypatch.setattr(planning, "known_model", lambda *_: (model, ()))
+    made = armgap.plan(diagnosis, limited, questions=["quadratic_drag:1"], duration=2.0)
+    assert not any("diverges" in note for note in made.notes)

@@ -20,6 +20,7 @@ from armgap.arm.arm import Arm, arm_of, only_planar
 from armgap.diagnosis.nominal import mismatch
 from armgap.diagnosis.result import Diagnosis
 from armgap.errors import OptionError, ResultError
+from armgap.evidence.hypothesis import Hypothesis
 from armgap.files.output import STANDARD_STREAM, write
 from armgap.planning.criterion import PredictedMotion, Setting
 from armgap.planning.dynamics import inverse_dynamics
@@ -314,9 +315,8 @@ def _usable(diagnosis: Diagnosis | str | os.PathLike[str], arm: Arm) -> dict[str
 def _plan(data: dict[str, Any], arm: Arm, wanted: Sequence[str], duration: float, seed: int) -> Plan:
     limits = limits_of(arm, data)
     model, notes = known_model(data, arm)
-    setting = Setting.of(data, model)
-    search = Search(setting, limits, duration)
-    usual = search.usual()
+    setting, search, usual, more = _usual_motion(data, model, limits, duration)
+    model, notes = setting.model, (*notes, *more)
     builder = HypothesisBuilder(data, usual, scales_of(arm, data, limits, usual, setting), model.effects)
     questions, remarks = open_questions(data)
     named = asked(wanted, data, arm)
@@ -370,6 +370,27 @@ def _plan(data: dict[str, Any], arm: Arm, wanted: Sequence[str], duration: float
         found.evaluations,
         (*_limit_notes(limits, arm), *notes, *remarks),
     )
+
+
+def _usual_motion(
+    data: dict[str, Any], model: Hypothesis, limits: PlanLimits, duration: float
+) -> tuple[Setting, Search, PredictedMotion, tuple[str, ...]]:
+    """Return the setting, the search, and a usual motion; without causes with which the arm diverges along it, and a remark on them.
+
+    A drag that falls with the cube of the velocity is bounded in a slow log, and in a fast motion makes the arm diverge.
+    """
+    setting = Setting.of(data, model)
+    search = Search(setting, limits, duration)
+    try:
+        return setting, search, search.usual(), ()
+    except OptionError:
+        if not model.effects:
+            raise
+    setting = Setting.of(data, model.only(()))
+    search = Search(setting, limits, duration)
+    gone = ", ".join(spelt(e.effect, e.joint) for e in model.effects)
+    remark = f"the planned motion is predicted without {gone}: with the diagnosed values the arm diverges within these limits"
+    return setting, search, search.usual(), (remark,)
 
 
 def _against_look_alikes(
