@@ -417,6 +417,7 @@ def _urgency(tested: TestedQuestion) -> tuple[int, float]:
 
 
 def scales_of(arm: Arm, data: dict[str, Any], limits: PlanLimits, usual: PredictedMotion, setting: Setting) -> Scales:
+    """Return typical torques, speeds and positions of a usual motion, and the ranges that the diagnosed logs covered (`regimes`)."""
     edges = {r["variable"]: r["edges"] for r in data.get("regimes") or []}
     n, motion = arm.n_joints, limits.motion
     seen = [edges.get(f"q{j}") or [0.0, 0.0] for j in range(1, n + 1)]

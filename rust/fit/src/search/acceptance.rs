@@ -190,8 +190,8 @@ impl<const N: usize, const P: usize> SearchNode<N, P> {
 
 /// Whether a candidate that leaves the cost `left` on the holdout, over a floor of `floor`, shows that another one is not the cause, whose windows'
 /// costs are higher by `z` standard errors of their mean difference, or in some windows far out of the noise (`has_outliers`). Beside unmodelled torques a
-/// small difference of the costs decides nothing: these torques are alike in all windows. Beside noise alone it does, and how much noise there is
-/// is known, so that windows need not agree: a motion may tell two effects apart in a few of them.
+/// small difference of the costs decides nothing: these torques are alike in all windows. Beside noise alone it does, and the noise is known there, so
+/// that windows need not agree: a motion may tell two effects apart in a few of them.
 fn excludes(left: f64, floor: f64, z: f64, has_outliers: bool) -> bool {
     left < AT_FLOOR * floor && (z > CLOSE || has_outliers)
 }
