@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from armgap import Arm, effects, seed_torque, simulate
+from armgap import Arm, _native, effects, seed_torque, simulate
 from armgap.errors import OptionError
 from armgap.simulation import Effect
 
@@ -173,3 +173,54 @@ def test_the_seed_torques_of_ten_seconds_are_simulated_by_default(tmp_path):
         simulate(arm, t, seed_torque(t), tolerance=1e-12)
     with pytest.raises(OptionError, match="tolerance"):
         simulate(arm, t, seed_torque(t), tolerance=0.0)
+
+
+def windowed(
+    effects_: list[tuple[str, int | None, dict[str, float]]], **options: object
+) -> tuple[np.ndarray, np.ndarray, list[int]]:
+    """Two overlapping windows of a double arm's motion, from different starts."""
+    theta, t, tau, starts = double_motion()
+    rows = [(0, 61), (40, 101)]
+    return _native.simulate_windows(
+        "two-link", 9.81, [1.0, 1.0], theta, t, tau, rows, 51, starts, -starts, effects_, 1e-7, [], **options
+    )
+
+
+def double_motion() -> tuple[list[float], np.ndarray, np.ndarray, np.ndarray]:
+    """Parameters, times, torques, and two starts of a double arm."""
+    theta = [3.0, 0.2, 0.15, 30.0, 1.0, 1.0, 0.1, 2.0, 0.5]
+    t = 4e-3 * np.arange(101)
+    return theta, t, np.stack([8 * np.sin(5 * t), np.cos(9 * t)], axis=1), np.array([[0.1, -0.4], [0.5, 0.2]])
+
+
+def test_windows_are_simulations_from_their_own_starts():
+    theta, t, tau, starts = double_motion()
+    spring = ("joint_spring", 2, {"k": 3.0, "q0": 0.1})
+    q, dq, substeps = windowed([spring])
+    assert q.shape == dq.shape == (2, 51, 2)
+    for w, rows in enumerate((slice(0, 61), slice(40, 101))):
+        alone = _native.simulate(
+            "two-link", 9.81, [1.0, 1.0], theta, t[rows], tau[rows], starts[w], -starts[w], [spring], 1e-7, []
+        )
+        np.testing.assert_array_equal(q[w], alone[0][-51:])
+        np.testing.assert_array_equal(dq[w], alone[1][-51:])
+    # The sub-steps that met the tolerance give the same motion within it, in one run each.
+    again, _, used = windowed([spring], substeps=substeps)
+    assert used == substeps
+    assert 0 < np.abs(again - q).max() < 1e-7
+
+
+def test_a_window_needs_samples_and_an_arm_that_is_not_too_stiff():
+    stiff = ("joint_elasticity", 2, {"stiffness": 1e5, "damping": 0.0, "rotor_inertia": 1e-4})
+    with pytest.raises(ValueError, match="so stiff that it needs"):
+        windowed([stiff], max_substeps=32)
+    theta, t, tau, starts = double_motion()
+    fixed = ("two-link", 9.81, [1.0, 1.0], theta, t, tau)
+    with pytest.raises(ValueError, match="`rows` needs windows of 51"):
+        _native.simulate_windows(*fixed, [(0, 50), (0, 102)], 51, starts, starts, [])
+    with pytest.raises(ValueError, match="`substeps` needs 2 values"):
+        windowed([], substeps=[1])
+    with pytest.raises(ValueError, match="`theta` needs 9 values"):
+        _native.simulate_windows(
+            "two-link", 9.81, [1.0, 1.0], theta[:3], t, tau, [(0, 51)], 51, starts[:1], starts[:1], []
+        )

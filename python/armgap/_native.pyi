@@ -20,6 +20,7 @@ __all__ = [
     "refit",
     "regression_rows",
     "simulate",
+    "simulate_windows",
     "theta_from_links",
     "velocity",
 ]
@@ -54,6 +55,23 @@ def simulate(
     smoothing: Sequence[float] = ...,
     progress: Callable[[str, float], object] | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+def simulate_windows(
+    kind: str,
+    gravity: float,
+    link_length: Sequence[float] | None,
+    theta: Sequence[float],
+    t: NDArray[np.float64],
+    tau: NDArray[np.float64],
+    rows: Sequence[tuple[int, int]],
+    samples: int,
+    q0: NDArray[np.float64],
+    dq0: NDArray[np.float64],
+    effects: Sequence[tuple[str, int | None, dict[str, float]]],
+    tolerance: float = 1e-9,
+    smoothing: Sequence[float] = ...,
+    substeps: Sequence[int] | None = None,
+    max_substeps: int = 256,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], list[int]]: ...
 def inertia(
     kind: str,
     gravity: float,

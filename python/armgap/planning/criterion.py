@@ -43,6 +43,9 @@ BEND = 6.0
 LEAD = 0.15
 #: Tolerance of predictions, in standard deviations of a measured position.
 ACCURACY = 0.1
+#: Largest number of steps of the integrator per predicted sample. An elastic joint that needs more, with a natural frequency of a kilohertz or so,
+#: is a rigid one to every log, and costs as much as all other predictions together.
+MAX_SUBSTEPS = 32
 #: Step of finite differences for a parameter's sensitivity, in standard deviations of its prior, and at most this part of its value.
 STEP_SIGMA, STEP_PART = 0.2, 0.02
 #: Part of a log, from its beginning, that a diagnosis fits models to; the rest is the holdout.
@@ -186,6 +189,9 @@ class PredictedMotion:
         self.tau = inverse_dynamics(setting.model, *held)
         self.held = held
         self._known: dict[Any, Array] = {}
+        #: Sub-steps per sample and window that met the tolerance for the first model predicted with the same effects, of other values: those of all
+        #: such models, whose differences then hold no error of a change of step.
+        self._substeps: dict[Any, list[int]] = {}
         polynomials, _ = np.linalg.qr(
             np.polynomial.legendre.legvander(np.linspace(-1.0, 1.0, self._samples + 1), DEGREES)
         )
@@ -253,14 +259,12 @@ class PredictedMotion:
         placed = [e.on(e.joint) for e in effects]
         lengths = None if arm.link_length is None else arm.link_length.tolist()
         tolerance = max(ACCURACY * float(self._setting.sigma.min()), 1e-9)
-        found = np.empty((self._count, s + 1, arm.n_joints))
-        for w in range(self._count):
-            rows = slice(int(begin[w]), int(first[w]) + s + 1)
-            q, _ = _native.simulate(
-                arm.kind, arm.gravity, lengths, list(theta), self.t[rows], self.tau[rows], q0[w], dq0[w], placed, tolerance,
-                model.smoothing if smoothing is None else smoothing,
-            )  # fmt: skip
-            found[w] = q[-(s + 1) :]
+        rows = list(zip(begin.tolist(), (first + s + 1).tolist(), strict=True))
+        structure = (tuple((e.effect, e.joint) for e in effects), lead, smoothing is None)
+        found, _, self._substeps[structure] = _native.simulate_windows(
+            arm.kind, arm.gravity, lengths, list(theta), self.t, self.tau, rows, s + 1, q0, dq0, placed, tolerance,
+            model.smoothing if smoothing is None else smoothing, self._substeps.get(structure), MAX_SUBSTEPS,
+        )  # fmt: skip
         return np.asarray(np.einsum("wsj,sk->wkj", found, self._basis), dtype=np.float64).ravel()
 
     def _true_start(self, rows: Array, effects: Sequence[EffectInstance]) -> tuple[Array, Array]:

@@ -30,15 +30,12 @@ def accelerations(model: Hypothesis, q: Array, dq: Array, tau: Array, t: Array) 
     arm = model.arm
     lengths = None if arm.link_length is None else arm.link_length.tolist()
     effects, theta = [e.on(e.joint) for e in model.effects], list(model.theta)
-    times = t[:, None] + np.array([0.0, INSTANT])
-    held = np.repeat(tau[:, None], 2, axis=1)
-    found = np.empty_like(q)
-    for k in range(len(q)):
-        _, speed = _native.simulate(
-            arm.kind, arm.gravity, lengths, theta, times[k], held[k], q[k], dq[k], effects, TOLERANCE, model.smoothing
-        )
-        found[k] = (speed[1] - speed[0]) / INSTANT
-    return found
+    times = (t[:, None] + np.array([0.0, INSTANT])).ravel()
+    rows = [(2 * k, 2 * k + 2) for k in range(len(q))]
+    _, speed, _ = _native.simulate_windows(
+        arm.kind, arm.gravity, lengths, theta, times, np.repeat(tau, 2, axis=0), rows, 2, q, dq, effects, TOLERANCE, model.smoothing
+    )  # fmt: skip
+    return (speed[:, 1] - speed[:, 0]) / INSTANT
 
 
 def inverse_dynamics(model: Hypothesis, q: Array, dq: Array, ddq: Array) -> Array:

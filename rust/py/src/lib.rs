@@ -29,7 +29,7 @@ mod _native {
     #[pymodule_export]
     use crate::regression::{bounded_least_squares, filtered_torques, regression_rows, velocity};
     #[pymodule_export]
-    use crate::simulate::{inertia, simulate};
+    use crate::simulate::{inertia, simulate, simulate_windows};
 
     use super::{Bound, PyModule, PyModuleMethods, PyResult};
 

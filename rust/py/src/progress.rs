@@ -35,8 +35,7 @@ pub fn with_progress<T: Send + 'static>(
 ) -> PyResult<T> {
     let Some(callback) = callback else {
         let nobody: Observer = Arc::new(|_| Control::Go);
-        let ended = py.detach(move || catch_unwind(AssertUnwindSafe(|| work(&nobody))));
-        return ended.map_err(defect);
+        return py.detach(move || guarded_from_panics(|| work(&nobody)));
     };
     let shared = Arc::new(Shared::default());
     let observer = observer(&shared);
@@ -61,6 +60,11 @@ pub fn with_progress<T: Send + 'static>(
             Err(error)
         }
     }
+}
+
+/// Runs `work` and returns its result; a panic is a Python error.
+pub fn guarded_from_panics<T>(work: impl FnOnce() -> T) -> PyResult<T> {
+    catch_unwind(AssertUnwindSafe(work)).map_err(defect)
 }
 
 /// Panic as a Python error, with the panic's message and a request to report it.

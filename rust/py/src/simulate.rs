@@ -1,15 +1,18 @@
 //! Python functions `simulate` and `inertia`.
 
 use crate::convert::{effect_instances, kind_of, matrix, vector};
-use crate::progress::with_progress;
+use crate::progress::{guarded_from_panics, with_progress};
 use armgap_fit::model::arm::ArmDescription;
 use armgap_fit::model::hypothesis::EffectInstance;
-use armgap_fit::predict::simulate::{InertiaMatrices, Simulation, SimulationError, Trajectory};
-use armgap_fit::progress::{Observer, ProgressReporter, guarded};
+use armgap_fit::predict::simulate::{
+    InertiaMatrices, MAX_SUBSTEPS, Simulation, SimulationError, Trajectory, Window,
+};
+use armgap_fit::progress::{Control, Observer, ProgressReporter, guarded};
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// Simulates an arm with effects under held torques: positions, rad or m, and velocities, (samples, joints).
 #[pyfunction]
@@ -37,6 +40,83 @@ pub fn simulate<'py>(
     let run = move |work: Simulation<'_>| arm.dispatch(work);
     inputs.run(py, kind.joints(), progress, run)?.ok_or_else(|| PyValueError::new_err(wrong))
 }
+
+/// Simulates windows of a motion on all threads, each from an initial state of its own, as `simulate` does: positions, rad or m, and velocities at
+/// the last `samples` of each window, (windows, samples, joints), and sub-steps per sample that met the tolerance, (windows,). With `substeps`, windows
+/// are simulated with those and no tolerance is checked; an arm that needs more than `max_substeps` is an error.
+#[pyfunction]
+#[pyo3(signature = (kind, gravity, link_length, theta, t, tau, rows, samples, q0, dq0, effects, tolerance=1e-9, smoothing=Vec::new(), substeps=None, max_substeps=MAX_SUBSTEPS))]
+pub fn simulate_windows<'py>(
+    py: Python<'py>,
+    kind: &str,
+    gravity: f64,
+    link_length: Option<Vec<f64>>,
+    theta: Vec<f64>,
+    t: PyReadonlyArray1<'py, f64>,
+    tau: PyReadonlyArray2<'py, f64>,
+    rows: Vec<(usize, usize)>,
+    samples: usize,
+    q0: PyReadonlyArray2<'py, f64>,
+    dq0: PyReadonlyArray2<'py, f64>,
+    effects: Vec<(String, Option<usize>, BTreeMap<String, f64>)>,
+    tolerance: f64,
+    smoothing: Vec<f64>,
+    substeps: Option<Vec<usize>>,
+    max_substeps: usize,
+) -> PyResult<WindowMotion<'py>> {
+    let kind = kind_of(kind)?;
+    let n = kind.joints();
+    let effects = effect_instances(n, effects)?;
+    let wrong = format!("`theta` needs {} values", kind.parameters().len());
+    let arm = ArmDescription::plain(kind, gravity, theta, link_length);
+    let t = vector(&t, "t")?;
+    let tau = matrix(&tau, "tau", t.len(), n)?;
+    let (q0, dq0) = (matrix(&q0, "q0", rows.len(), n)?, matrix(&dq0, "dq0", rows.len(), n)?);
+    if rows.iter().any(|&(begin, end)| begin > end || end > t.len() || end - begin < samples) {
+        let text = format!("`rows` needs windows of {samples} or more samples among {}", t.len());
+        return Err(PyValueError::new_err(text));
+    }
+    if substeps.as_ref().is_some_and(|all| all.len() != rows.len()) {
+        return Err(PyValueError::new_err(format!("`substeps` needs {} values", rows.len())));
+    }
+    let window = |w: usize| {
+        let (begin, end) = rows[w];
+        let start = n * w..n * (w + 1);
+        Window {
+            rows: begin..end,
+            q0: &q0[start.clone()],
+            dq0: &dq0[start],
+            substeps: substeps.as_ref().map(|all| all[w]),
+        }
+    };
+    let windows: Vec<Window<'_>> = (0..rows.len()).map(window).collect();
+    let nobody: Observer = Arc::new(|_| Control::Go);
+    let (rest, progress) = (vec![0.0; n], ProgressReporter::new(nobody));
+    let (effects, smoothing) = (&effects, &smoothing);
+    let work = Simulation {
+        t,
+        tau,
+        q0: &rest,
+        dq0: &rest,
+        effects,
+        tolerance,
+        max_substeps,
+        smoothing,
+        progress: &progress,
+    };
+    let ended = py.detach(|| guarded_from_panics(|| work.windows(&arm, &windows)))?;
+    let found = ended
+        .ok_or_else(|| PyValueError::new_err(wrong))?
+        .map_err(|e| PyValueError::new_err(e.to_string()))?;
+    let last = |of: fn(&Trajectory) -> &Vec<f64>| {
+        let all = found.iter().flat_map(|x| &of(x)[of(x).len() - samples * n..]).copied();
+        PyArray1::from_vec(py, all.collect()).reshape([rows.len(), samples, n])
+    };
+    Ok((last(|x| &x.q)?, last(|x| &x.dq)?, found.iter().map(|x| x.substeps).collect()))
+}
+
+/// Positions and velocities of windows, (windows, samples, joints), and sub-steps per sample, (windows,).
+type WindowMotion<'py> = (Bound<'py, PyArray3<f64>>, Bound<'py, PyArray3<f64>>, Vec<usize>);
 
 /// Arguments of a simulation of any arm.
 pub(crate) struct Inputs<'a, 'py> {
@@ -80,6 +160,7 @@ impl Inputs<'_, '_> {
                 dq0: &dq0,
                 effects: &effects,
                 tolerance,
+                max_substeps: MAX_SUBSTEPS,
                 smoothing: &smoothing,
                 progress: &reporter,
             };

@@ -1,6 +1,6 @@
 //! Simulation of a hypothesis under given torques, with sub-steps chosen from an error tolerance.
 
-use crate::model::arm::WithArm;
+use crate::model::arm::{ArmDescription, WithArm};
 use crate::model::hypothesis::{EffectInstance, Hypothesis};
 use crate::progress::{Phase, ProgressReporter};
 use armgap_core::arm::Arm;
@@ -8,9 +8,11 @@ use armgap_core::effect::{InputSegment, interval};
 use armgap_core::integrate::{Interval, State, advance};
 use armgap_core::kinematics::JointState;
 use nalgebra::SVector;
+use rayon::prelude::*;
+use std::ops::Range;
 
-/// Sub-steps per sample beyond which the error tolerance of a simulation is given up.
-const MAX_SUBSTEPS: usize = 256;
+/// Sub-steps per sample beyond which the error tolerance of a simulation is given up, by default.
+pub const MAX_SUBSTEPS: usize = 256;
 
 /// Samples of a simulation between two checks for progress and cancellation.
 const LOOK: usize = 4096;
@@ -30,6 +32,8 @@ pub struct Simulation<'a> {
     pub effects: &'a [EffectInstance],
     /// Largest admissible change of any position when the sub-steps are halved, rad or m.
     pub tolerance: f64,
+    /// Largest number of sub-steps per sample.
+    pub max_substeps: usize,
     /// Width of the friction regularisation of each joint, rad/s (m/s); zero for exact dry friction, also where none is given.
     pub smoothing: &'a [f64],
     /// Receiver of progress reports, with cancellation.
@@ -43,7 +47,7 @@ pub struct Trajectory {
     pub q: Vec<f64>,
     /// Velocities, rad/s or m/s.
     pub dq: Vec<f64>,
-    /// Sub-steps per sample that met the tolerance.
+    /// Smallest number of sub-steps per sample tried that met the tolerance; the trajectory may have been computed with more.
     pub substeps: usize,
 }
 
@@ -56,6 +60,8 @@ pub enum SimulationError {
     Diverged(usize),
     /// Halving the sub-steps still changes a position by this much, rad or m, more than the tolerance.
     Tolerance(f64),
+    /// Stability needs this many sub-steps per sample, more than there may be.
+    Stiff(f64),
 }
 
 impl std::fmt::Display for SimulationError {
@@ -63,6 +69,7 @@ impl std::fmt::Display for SimulationError {
         match self {
             Self::Effects => write!(f, "too many effects, or an effect on a joint the arm does not have"),
             Self::Diverged(k) => write!(f, "the simulated motion diverges at sample {}", k + 1),
+            Self::Stiff(n) => write!(f, "the arm is so stiff that it needs {n:.0} steps per sample"),
             Self::Tolerance(e) => write!(f, "positions still change by {e:.1e} when the steps are halved"),
         }
     }
@@ -77,9 +84,7 @@ impl WithArm for Simulation<'_> {
         arm: A,
         theta: [f64; P],
     ) -> Self::Output {
-        let widths: [f64; N] = std::array::from_fn(|j| self.smoothing.get(j).copied().unwrap_or(0.0));
-        let hypothesis =
-            Hypothesis { effects: self.effects.to_vec(), ..Hypothesis::rigid(theta).rounded_over(widths) };
+        let hypothesis = self.hypothesis::<N, P>(theta);
         let first = self.first_substeps::<A, N, P>(&arm, &hypothesis)?;
         let mut coarse = self.run::<A, N, P>(&arm, &hypothesis, first)?;
         let mut substeps = 2 * first;
@@ -87,9 +92,9 @@ impl WithArm for Simulation<'_> {
             let fine = self.run::<A, N, P>(&arm, &hypothesis, substeps)?;
             let change = coarse.q.iter().zip(&fine.q).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
             if change <= self.tolerance {
-                return Ok(fine);
+                return Ok(Trajectory { substeps: substeps / 2, ..fine });
             }
-            if substeps >= MAX_SUBSTEPS {
+            if substeps >= self.max_substeps {
                 return Err(SimulationError::Tolerance(change));
             }
             coarse = fine;
@@ -98,7 +103,74 @@ impl WithArm for Simulation<'_> {
     }
 }
 
+/// Part of a simulation's samples, simulated by itself.
+#[derive(Debug, Clone)]
+pub struct Window<'a> {
+    /// Samples of the window.
+    pub rows: Range<usize>,
+    /// Positions at its first sample, rad or m.
+    pub q0: &'a [f64],
+    /// Velocities at its first sample, rad/s or m/s.
+    pub dq0: &'a [f64],
+    /// Sub-steps per sample, more where stability needs more; `None` to choose them by the tolerance.
+    pub substeps: Option<usize>,
+}
+
+/// Simulation with a given number of sub-steps per sample, more where stability needs more.
+struct FixedSubsteps<'a>(Simulation<'a>, usize);
+
+impl WithArm for FixedSubsteps<'_> {
+    type Output = Result<Trajectory, SimulationError>;
+
+    fn call<A: Arm<f64, N, P>, const N: usize, const P: usize, const R: usize>(
+        self,
+        arm: A,
+        theta: [f64; P],
+    ) -> Self::Output {
+        let Self(simulation, substeps) = self;
+        let hypothesis = simulation.hypothesis::<N, P>(theta);
+        let stable = simulation.first_substeps::<A, N, P>(&arm, &hypothesis)?;
+        simulation.run::<A, N, P>(&arm, &hypothesis, substeps.max(stable))
+    }
+}
+
 impl Simulation<'_> {
+    fn hypothesis<const N: usize, const P: usize>(&self, theta: [f64; P]) -> Hypothesis<P> {
+        let width = |j: usize| self.smoothing.get(j).copied().unwrap_or(0.0);
+        Hypothesis {
+            effects: self.effects.to_vec(),
+            ..Hypothesis::rigid(theta).rounded_over::<N>(std::array::from_fn(width))
+        }
+    }
+
+    /// Trajectories of windows of the samples, on all threads; `None` if the parameters do not fit the arm.
+    ///
+    /// # Errors
+    ///
+    /// The error of the first window that has no trajectory.
+    ///
+    /// # Panics
+    ///
+    /// If a window contains samples that the simulation does not have.
+    pub fn windows(
+        &self,
+        arm: &ArmDescription,
+        windows: &[Window<'_>],
+    ) -> Option<Result<Vec<Trajectory>, SimulationError>> {
+        let torques = self.q0.len();
+        let each = |w: &Window<'_>| {
+            let tau = &self.tau[w.rows.start * torques..w.rows.end * torques];
+            let window = Simulation { t: &self.t[w.rows.clone()], tau, q0: w.q0, dq0: w.dq0, ..self.clone() };
+            match w.substeps {
+                None => arm.dispatch(window),
+                Some(substeps) => arm.dispatch(FixedSubsteps(window, substeps)),
+            }
+        };
+        // Collected first, so that the error does not depend on the threads.
+        let all: Vec<_> = windows.par_iter().map(each).collect();
+        all.into_iter().collect()
+    }
+
     /// Number of sub-steps per sample that keeps the stiffest part of the arm stable.
     fn first_substeps<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         &self,
@@ -108,7 +180,11 @@ impl Simulation<'_> {
         let plant = hypothesis.plant(arm).ok_or(SimulationError::Effects)?;
         let longest = self.t.windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max);
         let rate = plant.fastest(&SVector::from_fn(|j, _| self.q0[j]));
-        Ok(((rate * longest).ceil() as usize).clamp(1, MAX_SUBSTEPS / 2))
+        let needed = (rate * longest).ceil();
+        if needed > self.max_substeps as f64 {
+            return Err(SimulationError::Stiff(needed));
+        }
+        Ok((needed as usize).clamp(1, (self.max_substeps / 2).max(1)))
     }
 
     fn run<A: Arm<f64, N, P>, const N: usize, const P: usize>(
