@@ -250,8 +250,8 @@ class Corrections:
             for values in _of(columns, _POSITIONS[kind]):
                 values[:, j] += value
         for names, sign in ((self.absolute, -1.0), (self.relative, 1.0)):
-            for column in names:
-                _, j = _split(column)
+            # An angle from the world is taken from those of later joints before its own becomes relative; the reverse the other way round.
+            for j in sorted((_split(column)[1] for column in names), reverse=sign < 0):
                 for values in _of(columns, _TOGETHER["q"]):
                     values[:, j] += sign * values[:, j - 1]
 

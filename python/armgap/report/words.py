@@ -339,7 +339,8 @@ def _where(data: Data) -> tuple[str, str]:
     load = "force" if data["gap"].get("unit") == "m" else "torque"
     text = f"{percent(first['share'])} of what is missing from the model acts on joint {first['joint']}"
     if len(data["gap"]["before"]) == 1:
-        text = f"The {load} that is missing from the model acts throughout"
+        at_times = data["causes"] and all(c.get("log") for c in data["causes"])
+        text = f"The {load} that is missing from the model acts {'at times' if at_times else 'throughout'}"
     if ranged:
         text += f", and is largest {_inside(first)}"
     others = [f"{percent(p['share'])} on joint {p['joint']}" for p in places[1:] if p["share"] >= MINOR_JOINT]
@@ -452,21 +453,33 @@ def _how_far(data: Data) -> tuple[str, str]:
         headline, errors = "With the remedy applied", each_joint(before, refit, units=units, joints=joints)
     elif data["verdict"] == "none":
         headline, errors = "Nothing to shrink", each_joint(after, units=units, joints=joints)
-    elif data["verdict"] == "unexplained":
+    elif data["verdict"] == "unexplained" and (
+        gap.get("training") or not exceeds_floor(data, "before") or gap["closed"] <= 0
+    ):
         headline = "The held-out motion shows none; the training logs do" if gap.get("training") else "It stays"
         errors = each_joint(after, units=units, joints=joints)
+    elif data["verdict"] == "unexplained":
+        headline = f"By {percent(gap['closed'])} with other values of the arm; the rest stays"
+        errors = each_joint(before, after, units=units, joints=joints)
     else:
         headline, errors = _share_closed(data), each_joint(before, after, units=units, joints=joints)
     detail = (
         f"{errors}: RMS error of predictions over {gap['horizon_s']:g} s on held-out motion"
         f"{', of the joints that the arm file misses most' if few else ''}. Re-estimating the arm file's own values alone "
-        f"leaves {millis(refit, units)}; a perfect model would miss by {millis(floor, units)}, from noise and the measured starts."
+        f"leaves {millis(refit, units)}; {_perfect(data, floor, units)}"
     )
     if data["verdict"] not in ("none", "input") and exceeds_floor(data, "before"):
         low, high = (percent(max(share, -1.0)) for share in gap["closed_ci"])
         below = "below " if gap["closed_ci"][0] < -1.0 else ""
         detail += f" 95\N{NO-BREAK SPACE}% interval of the share closed: {below}{low} to {high}."
     return headline, detail
+
+
+def _perfect(data: Data, floor: Sequence[float], units: Sequence[str]) -> str:
+    """Return what a perfect model would miss by, as the end of a sentence; filtered positions do not show their noise."""
+    if any(check["check"] == "filtered_positions" for check in data.get("checks") or []):
+        return "what a perfect model would miss by is not known, as the positions are filtered."
+    return f"a perfect model would miss by {millis(floor, units)}, from noise and the measured starts."
 
 
 def _share_closed(data: Data) -> str:

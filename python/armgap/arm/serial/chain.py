@@ -28,6 +28,10 @@ _SHAPES: dict[str, tuple[int, ...]] = {
 }
 
 
+#: Largest sine of the angle between two axes that count as parallel: some hundredths of a degree of rounding in a description.
+PARALLEL = 1e-3
+
+
 def _unknown() -> NDArray[np.float64]:
     """Return an empty array, which stands for limits that are not given."""
     return np.empty(0)
@@ -109,6 +113,14 @@ class SerialChain:
     def rotary(self) -> tuple[bool, ...]:
         """Whether each joint is rotary."""
         return tuple(kind == "revolute" for kind in self.kinds)
+
+    @property
+    def parallel_joints(self) -> tuple[int, ...]:
+        """Joints, from 1, that turn about an axis parallel to that of the preceding joint, which turns too."""
+        before = np.einsum("jki,jk->ji", self.rotation[1:], self.axis[:-1])
+        across = np.linalg.norm(np.cross(before, self.axis[1:]), axis=1)
+        turn = self.rotary
+        return tuple(j + 2 for j, sine in enumerate(across) if turn[j] and turn[j + 1] and sine < PARALLEL)
 
     @property
     def parameter_names(self) -> tuple[str, ...]:

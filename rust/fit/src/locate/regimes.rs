@@ -13,11 +13,14 @@ use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-/// Half width, in samples, of the local cubic whose curvature is the residual acceleration.
-const CURVATURE_HALF_WIDTH: usize = 8;
+/// Half width, in samples, of the local cubic whose curvature is the residual acceleration: the largest, and the smallest in windows of few samples.
+const CURVATURE_HALF_WIDTH: [usize; 2] = [8, 3];
 
 /// Time from a sign change of a joint's velocity within which the joint counts as near a reversal, s.
 const REVERSAL_S: f64 = 0.05;
+
+/// Fewest samples of a bin that may stand out.
+const FEWEST_IN_BIN: usize = 5;
 
 /// Number of bins of a variable over which residual torques are averaged.
 const BINS: usize = 6;
@@ -58,13 +61,15 @@ pub fn residual_torques<A: Arm<f64, N, P>, const N: usize, const P: usize, const
         .map(|window| {
             let track = &data.tracks[window.track];
             let times = &track.t[window.first + 1..=window.last];
-            let rows = if times.len() < 2 * CURVATURE_HALF_WIDTH + 1 { 0..0 } else { 0..times.len() };
+            let [most, fewest] = CURVATURE_HALF_WIDTH;
+            let half = most.min(times.len().saturating_sub(1) / 2);
+            let rows = if half < fewest { 0..0 } else { 0..times.len() };
             let residual = |i: usize, h: usize| {
                 let k = window.first + 1 + i;
                 let rows = &predicted[h][window.range()];
                 let curvature = SVector::<f64, N>::from_fn(|j, _| {
                     let error = |r: usize| track.q[window.first + 1 + r][j] - rows[r * N + j];
-                    local_cubic(times, error, i, CURVATURE_HALF_WIDTH).ddq
+                    local_cubic(times, error, i, half).ddq
                 });
                 arm.inertia(&hypotheses[h].theta, &track.q[k]) * curvature
             };
@@ -292,7 +297,7 @@ fn standing_out(j: usize, share: f64, regimes: &[Regime]) -> Location {
         let mean = pairs().map(|(r, n)| r * r * *n as f64).sum::<f64>() / samples.max(1) as f64;
         for (b, (rms, count)) in pairs().enumerate() {
             let contrast = rms * rms / mean.max(1e-300);
-            if *count * 20 >= samples && contrast > best.map_or(REGIME_CONTRAST, |x| x.0) {
+            if *count >= FEWEST_IN_BIN.max(samples / 20) && contrast > best.map_or(REGIME_CONTRAST, |x| x.0) {
                 best = Some((contrast, regime, b));
             }
         }

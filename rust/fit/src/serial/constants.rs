@@ -22,7 +22,8 @@ pub const HOLDOUT_DEVIATIONS: f64 = 3.0;
 /// Smallest share, 0 to 1, of the squared holdout residuals of at least one joint that a term of the model has to remove to be accepted.
 pub const MATTERS: f64 = 0.1;
 
-/// Smallest RMS torque of a term of the model, relative to the RMS torque of the joint that it acts on most, at which the term is accepted.
+/// Smallest RMS torque of a term of the model where it acts, relative to the RMS torque of the joint that it acts on most, at which the term is
+/// accepted. Of the RMS over all rows, Stribeck friction that left a joint's predictions 30 noise floors off had 0.004.
 pub const CONSEQUENCE: f64 = 0.005;
 
 /// Decrease of the parameters' squared distance from the arm file's values, counted in standard deviations, above which a term that only brings the

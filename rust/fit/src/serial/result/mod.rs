@@ -74,9 +74,10 @@ pub(crate) fn assemble<const N: usize, const P: usize>(
     let measured = data.measured();
     let floor: Vec<f64> = floor(data, &noise).iter().map(|v| v.sqrt()).collect();
     let missed = |i: usize| rms::<N>(&measured, &limited(&measured, &predicted[i]));
+    // The way back, from these errors to those of the re-estimated arm, closes a part of the gap; the re-estimated arm itself may have none.
     let is_worse = |errors: &[f64]| {
         let refit = missed(1);
-        closed(&refit, errors, &floor) < 0.0 && is_improved(errors, &refit, &floor)
+        closed(errors, &refit, &floor) > 0.0 && is_improved(errors, &refit, &floor)
     };
     let (worse, refit_missed) = (is_worse(&missed(2)), missed(1));
     // Deflections of elastic joints and backlash are not measured, so that predictions say little about these causes; they still judge the others.

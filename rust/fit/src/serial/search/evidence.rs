@@ -28,13 +28,13 @@ pub struct Evidence {
     /// Squared test statistic of the term on the training logs: estimated size over its standard deviation, robust to residuals correlated within
     /// blocks.
     pub statistic: f64,
-    /// Decrease of the holdout's cost (weighted squared residuals) by the term, on the joints that the term acts on.
+    /// Decrease of the holdout's cost (weighted squared residuals) by the term, on the joints that are judged: those that it acts on, or all.
     pub holdout_gain: f64,
     /// Size of the term in the holdout, relative to the training logs, over the size's standard deviation (see [`Search::evidence`]).
     pub deviations: f64,
     /// Share of a joint's holdout cost (weighted squared residuals) that the term removes, 0 to 1, for the joint with the largest share.
     pub share: f64,
-    /// RMS torque of the term relative to the RMS torque of the joint, for the joint with the largest ratio.
+    /// RMS torque of the term where it acts ([`where_it_acts`]) relative to the RMS torque of the joint, for the joint with the largest ratio.
     pub consequence: f64,
 }
 
@@ -68,8 +68,9 @@ impl Search<'_> {
     /// Evidence for the term of index `index` in the model `with`, compared with the model `without` the term.
     ///
     /// On the holdout, the residuals of the model without the term are regressed on the part of them that the term removes: a slope of one says that
-    /// the effect has the size that the training logs gave it, a slope of zero that it is absent. Only joints that the term acts on count, as the
-    /// scatter of the other joints' parameters says nothing about the term. The slope's standard deviation comes from the scatter of the blocks'
+    /// the effect has the size that the training logs gave it, a slope of zero that it is absent. The joints that the term acts on count, as the
+    /// scatter of the other joints' parameters says nothing about the term; or all joints, where these say more: a wrong torque gain of an outer joint
+    /// shows on an inner one, whose torque holds the same links. The slope's standard deviation comes from the scatter of the blocks'
     /// scores. How unevenly an effect is spread over the blocks does not count against the effect: a joint limit may be reached only twice in a log.
     pub(in crate::serial) fn evidence(
         &self,
@@ -86,13 +87,21 @@ impl Search<'_> {
         });
         let joints = self.rotary.len();
         let acts_on: Vec<usize> = (0..joints).filter(|j| signal[*j].is_some()).collect();
+        let all: Vec<usize> = (0..joints).collect();
         let cost = |set: &Fitted, j: usize| set.costs[1][j].iter().sum::<f64>();
         let share = (0..joints)
             .map(|j| (1.0 - cost(with, j) / cost(without, j)).max(0.0))
             .filter(|share| share.is_finite())
             .fold(0.0, f64::max);
         let relief = without.estimate.prior_cost - with.estimate.prior_cost;
-        let holdout_gain = acts_on.iter().map(|j| cost(without, *j) - cost(with, *j)).sum();
+        let judged = |on: &[usize]| {
+            let gain: f64 = on.iter().map(|j| cost(without, *j) - cost(with, *j)).sum();
+            (confirmed(on, &regression.weights, self.holdout.rows(), [without, with]), gain)
+        };
+        let (deviations, holdout_gain) = [judged(&acts_on), judged(&all)]
+            .into_iter()
+            .max_by(|a, b| a.0.total_cmp(&b.0))
+            .unwrap_or((0.0, 0.0));
         Evidence {
             parameters: term.degrees,
             price: match term.kind {
@@ -103,9 +112,9 @@ impl Search<'_> {
             relief,
             statistic,
             holdout_gain,
-            deviations: confirmed(&acts_on, &regression.weights, self.holdout.rows(), [without, with]),
+            deviations,
             share,
-            consequence: consequence(self.training.rows(), &signal),
+            consequence: where_it_acts(self.training.rows(), &signal),
         }
     }
 
@@ -166,9 +175,24 @@ fn confirmed(joints: &[usize], weights: &[f64], rows: &Rows, [without, with]: [&
 
 /// RMS of a torque signal relative to the RMS torque of the joint that it acts on, for the joint with the largest ratio.
 pub(in crate::serial) fn consequence(rows: &Rows, signal: &Signal) -> f64 {
-    let square = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>();
+    relative(rows, signal, |s| mean_square(s).sqrt())
+}
+
+/// RMS of a torque signal where it acts, relative to the RMS torque of the joint that it acts on, for the joint with the largest ratio. Rows count by
+/// the signal's square: friction at rest, or a joint limit, acts for a small part of the time.
+pub(in crate::serial) fn where_it_acts(rows: &Rows, signal: &Signal) -> f64 {
+    let fourth = |s: &[f64]| s.iter().map(|s| s.powi(4)).sum::<f64>() / s.len() as f64;
+    relative(rows, signal, |s| (fourth(s) / mean_square(s).max(f64::MIN_POSITIVE)).sqrt())
+}
+
+fn mean_square(x: &[f64]) -> f64 {
+    x.iter().map(|x| x * x).sum::<f64>() / x.len() as f64
+}
+
+/// A measure of a torque signal relative to the RMS torque of the joint that it acts on, for the joint with the largest ratio.
+fn relative(rows: &Rows, signal: &Signal, measure: impl Fn(&[f64]) -> f64) -> f64 {
     let of = |(rows, s): (&JointRows, &Option<Vec<f64>>)| match s {
-        Some(s) if !s.is_empty() => (square(s) / square(&rows.y).max(f64::MIN_POSITIVE)).sqrt(),
+        Some(s) if !s.is_empty() => measure(s) / mean_square(&rows.y).max(f64::MIN_POSITIVE).sqrt(),
         _ => 0.0,
     };
     rows.joints.iter().zip(signal).map(of).fold(0.0, f64::max)

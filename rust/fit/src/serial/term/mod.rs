@@ -294,6 +294,25 @@ impl Term {
         matches!(self.kind, TermKind::Controller(of) if of.setting == Setting::Gain).then(|| self.p[0])
     }
 
+    /// Whether friction with the term still dissipates in both directions at rest, where the joints have the Coulomb friction `coulomb`, N m or N, up to
+    /// a tenth of it: friction that drives a joint is a torque.
+    pub fn dissipates(&self, coulomb: &[f64]) -> bool {
+        self.members().iter().filter_map(Term::effect).all(|effect| {
+            let level = coulomb[effect.joint];
+            let at = |direction: f64| JointPoint {
+                t: 0.0,
+                q: 0.0,
+                dq: 0.0,
+                friction: level,
+                other: direction,
+                ..POINT
+            };
+            let added = |direction: f64| effect.law.coulomb(&effect.p, &at(direction), direction);
+            !effect.law.spec().hooks.coulomb
+                || added(1.0).min(added(-1.0)) >= -(1.0 + UNCERTAIN_FRICTION) * level
+        })
+    }
+
     /// Whether the term is a factor on the torque command.
     pub fn is_gain(&self) -> bool {
         if let TermKind::Joints(of) = &self.kind {
@@ -331,19 +350,17 @@ impl Term {
     }
 }
 
+/// State of a joint at which laws are compared.
+const POINT: JointPoint<f64> =
+    JointPoint { t: 1.0, q: 0.1, dq: 1.0, tau: 0.5, load: 0.5, friction: 1.0, other: 1.0, memory: 0.0 };
+
+/// Share of a joint's Coulomb friction by which a term's may exceed it, as both are estimates.
+const UNCERTAIN_FRICTION: f64 = 0.1;
+
 /// Whether an effect's torque depends on the quantity of the joint's state (position, velocity, torque) that `set` assigns.
 fn depends(effect: &EffectInstance, set: impl Fn(&mut JointPoint<f64>, f64)) -> bool {
     let torque = |value: f64| {
-        let mut x = JointPoint {
-            t: 1.0,
-            q: 0.1,
-            dq: 1.0,
-            tau: 0.5,
-            load: 0.5,
-            friction: 1.0,
-            other: 1.0,
-            memory: 0.0,
-        };
+        let mut x = POINT;
         set(&mut x, value);
         effect.law.force(&effect.p, &x) - effect.law.coulomb(&effect.p, &x, 1.0)
     };
