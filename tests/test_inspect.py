@@ -238,6 +238,16 @@ def test_a_mapping_that_is_wrong_is_refused_as_before(run, odd, tmp_path):
     assert not (tmp_path / "x.html").exists()
 
 
+def test_a_cell_that_is_no_number_is_no_question_of_names(run, frame, tmp_path):
+    path = tmp_path / "log.csv"
+    texts = ["ERR" if row == 77 else str(q) for row, q in enumerate(frame["q1"])]
+    frame.with_columns(q1=pl.Series(texts)).write_csv(path)
+    status, out, err = run("inspect", path)
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert "column `q1`, row 78: `ERR` is not a number" in err
+    assert "--columns" not in err
+
+
 def test_the_page_has_the_conventions_of_its_arm(arm, seed_log):
     page = render([inspect(seed_log, arm)])
     assert 'id="conventions"' in page

@@ -101,7 +101,10 @@ def command(
 def _inspected(
     path: Path, arm: Arm | None, naming: dict[str, Any], *, listing: bool, repair: bool
 ) -> Inspection | Columns:
-    """Return the inspection of a log; or, for unknown column names without a mapping, the columns with a proposed mapping."""
+    """Return the inspection of a log; or, for unknown column names without a mapping, the columns with a proposed mapping.
+
+    An error that names a row is about a cell of a column that was found, so a mapping is no remedy.
+    """
     from armgap.errors import ColumnError
     from armgap.inspection.inspection import inspect
     from armgap.inspection.unmapped import columns_of
@@ -109,8 +112,8 @@ def _inspected(
 
     try:
         return inspect(Log.read(path, arm=arm, **naming), arm, repair=repair)
-    except ColumnError:
+    except ColumnError as error:
         mapped = naming["columns"] or (arm is not None and arm.columns)
-        if mapped or not listing or str(path) == "-":
+        if mapped or error.row is not None or not listing or str(path) == "-":
             raise
         return columns_of(path, arm)
