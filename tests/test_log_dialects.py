@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import polars as pl
@@ -123,6 +124,53 @@ def test_stamps_since_1970_need_no_arm_and_lose_nothing(seed_log, frame):
     log = Log.from_frame(frame.with_columns(t=stamps))
     np.testing.assert_array_equal(log.t, seed_log.t)
     assert "times are in ns: they are stamps since 1970" in said(log, "units")
+
+
+def dates(frame: pl.DataFrame, offset: Callable[[int], str]) -> pl.DataFrame:
+    """The frame with dates as text in winter time until row 400 and in summer time from there on, each with its offset from UTC."""
+    start = np.datetime64("2026-03-29T00:59:59", "ns")
+    utc = start + (frame["t"] * 1e9).round().cast(pl.Int64).to_numpy().astype("timedelta64[ns]")
+    hours = np.where(np.arange(len(frame)) < 400, 1, 2)
+    local = utc + hours.astype("timedelta64[h]")
+    texts = [str(t).replace("T", " ")[:23] + offset(int(h)) for t, h in zip(local, hours, strict=True)]
+    return frame.with_columns(t=pl.Series(texts))
+
+
+@pytest.mark.parametrize("offset", ["+{:02d}:00", "+{:02d}00", "+{:02d}", " +{:02d}:00"])
+def test_dates_with_an_offset_from_utc(offset, seed_log, frame, tmp_path):
+    """As pandas, polars and databases write them; the change to summer time is no jump."""
+    path = tmp_path / "log.csv"
+    frame = frame.with_columns(pl.col("t") * 0.4)  # 1 ms, which three decimals hold
+    dates(frame, offset.format).write_csv(path)
+    np.testing.assert_allclose(Log.read(path).t, 0.4 * seed_log.t, atol=1e-9)
+
+
+def test_dates_as_pandas_writes_them(seed_log, frame, tmp_path):
+    pandas = pytest.importorskip("pandas")
+    path = tmp_path / "log.csv"
+    table = pandas.DataFrame({name: frame[name].to_numpy() for name in frame.columns})
+    table["t"] = pandas.to_datetime(table["t"], unit="s", utc=True).dt.round("us").dt.tz_convert("Europe/Berlin")
+    table.to_csv(path, index=False)
+    assert "+01:00" in path.read_text()
+    same(Log.read(path), seed_log, 1e-9)
+
+
+@pytest.mark.parametrize(
+    ("texts", "says"),
+    [
+        ({3: "ERR"}, "row 4: `ERR` is not a date, as the other times are"),
+        ({3: None}, "row 4: the value is missing"),
+        (dict.fromkeys(range(800), "05.01.2026 12:00:00,004"), "dates like 2026-01-05T12:00:00.004"),
+    ],
+    ids=["a word", "an empty cell", "other dates"],
+)
+def test_what_is_no_date_is_named_with_its_row(texts, says, frame):
+    changed = dates(frame, "+{:02d}:00".format)["t"].to_list()
+    for row, text in texts.items():
+        changed[row] = text
+    with pytest.raises(ColumnError) as caught:
+        Log.from_frame(frame.with_columns(t=pl.Series(changed)))
+    assert says in str(caught.value)
 
 
 def test_degrees_are_recognised_by_velocities_and_by_counts(seed_log, arm, frame):

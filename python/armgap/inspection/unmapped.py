@@ -16,6 +16,7 @@ import polars as pl
 from numpy.typing import NDArray
 
 from armgap.errors import ArmgapError, UnitError
+from armgap.log.conversion.dates import nanoseconds
 from armgap.log.formats.all import record
 from armgap.log.log import Log
 from armgap.log.recording import Recording
@@ -134,6 +135,8 @@ def _column(recording: Recording, name: str) -> Column:
     unit = stream.units.get(name)
     if series.dtype.is_temporal():
         series = series.to_physical()
+    elif (dates := nanoseconds(series)) is not None:
+        series = pl.Series(name, dates)
     if not series.dtype.is_numeric():
         numbers = series.cast(pl.Float64, strict=False) if series.dtype == pl.String else None
         if numbers is None or numbers.null_count() == len(numbers):
