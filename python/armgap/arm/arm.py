@@ -74,7 +74,7 @@ class Arm:
         Inertial base parameters, then viscous, then Coulomb coefficients per joint [SI], and the standard deviation of each. The inertial parameters
         of a serial arm are ten per link, see `armgap.arm.rigid_body`, then the rotors' inertias at the joints.
     counts_per_rev : array_like, shape (n_joints,), optional
-        Encoder counts per revolution (per metre on a linear joint).
+        Encoder counts per turn of the joint, also for an encoder at the motor (per metre on a linear joint).
     torque_limit : array_like, shape (n_joints,), optional
         Torque limit [N m].
     link_length : array_like, shape (n_joints,), optional

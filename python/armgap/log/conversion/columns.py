@@ -16,6 +16,7 @@ from armgap.errors import ColumnError, LogShapeError, SampleError, UnitError
 from armgap.log.conversion.dates import nanoseconds, odd_row
 from armgap.log.conversion.index import Index
 from armgap.log.conversion.joint_names import named_after_joints
+from armgap.log.conversion.spellings import is_current
 from armgap.log.findings import Finding
 from armgap.log.recording import Recording
 from armgap.progress import report_progress
@@ -183,8 +184,8 @@ def _pick_all(index: Index, names: Mapping[str, str], mapping: Mapping[str, str]
     _check_once(index, found)
     return replace(
         found,
-        units={c: unit for _, c in found.pairs if (unit := index.unit(c)) is not None},
-        foreign_units={c: unit for _, c in found.pairs if (unit := index.foreign_unit(c)) is not None},
+        units={c: unit for key, c in found.pairs if (unit := index.unit(c, group_of(key))) is not None},
+        foreign_units={c: unit for key, c in found.pairs if (unit := index.foreign_unit(c, group_of(key))) is not None},
     )
 
 
@@ -379,6 +380,8 @@ def unknown_unit(column: str, unit: str, key: str, place: Path | str, *, mapped:
     mapping = "" if mapped else f"--columns {key}='{column}' "
     declared = {"t": "t=s", "q": "q=rad", "dq": "dq=rad/s", "tau": "tau=Nm"}[group]
     factor = f" and a factor with --factor {key}=VALUE" if group == "tau" else ""
+    if is_current(unit):
+        factor = f" and --factor {key}=VALUE, N m at the joint per {unit}: torque constant times gear ratio"
     return UnitError(
         f"is in `{unit}`, a unit that is not known",
         remedy=f"convert it in the file, or read it as it is with {mapping}--units {declared}{factor}",
