@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from armgap import Arm
-from armgap.errors import ArmFileError
+from armgap.errors import ArmFileError, OptionError
 from conftest import TABLE_ONE
 
 # Reyes and Kelly (1997), Table II, column "Measured", inertial parameters as printed.
@@ -164,3 +164,42 @@ def test_the_example_of_the_real_arm(pytestconfig):
     theta = [i1 + i2 + m2 * l1**2, m2 * r2 * l1, i2, g * (m1 * r1 + m2 * l1), g * m2 * r2]
     np.testing.assert_allclose(arm.theta[:5], theta, atol=5.1e-5)
     assert arm.columns["tau2"] == "tau_con2"
+
+
+PENDULUM = {"name": "bench", "kind": "pendulum", "gravity": 9.81, "sample_period": 0.004}
+
+
+def test_lists_of_numbers_make_an_arm():
+    arm = Arm(**PENDULUM, theta=[0.05, 0.6, 0.02, 0.1], sigma=(0.01,) * 4, counts_per_rev=[4096])
+    np.testing.assert_array_equal(arm.theta, [0.05, 0.6, 0.02, 0.1])
+    assert {x.dtype for x in (arm.theta, arm.sigma, arm.counts_per_rev)} == {np.dtype(np.float64)}
+    assert arm.encoder_step.tolist() == [2 * np.pi / 4096]
+
+
+@pytest.mark.parametrize(
+    ("changed", "says"),
+    [
+        ({"kind": "pendulm"}, "`pendulm` is not a kind of arm; did you mean `pendulum`? (known: axis, pendulum, two-link, serial)"),
+        ({"kind": None}, "`None` is not a kind of arm"),
+        (
+            {"theta": [0.05, 0.6, 0.02]},
+            "theta has 3 entries; give 4: theta1 [kg m^2], theta2 [N m], viscous1 [N m s/rad], coulomb1 [N m]",
+        ),
+        ({"theta": np.ones((2, 4))}, "theta has the shape (2, 4)"),
+        ({"theta": [0.05, 0.6, 0.02, math.nan]}, "theta holds nan at entry 4; give finite numbers"),
+        ({"theta": [0.05, 0.6, 0.02, "much"]}, "theta is [0.05, 0.6, 0.02, 'much']; give 4: theta1"),
+        ({"theta": 0.05}, "theta is 0.05"),
+        ({"sigma": [0.1] * 5}, "sigma has 5 entries; give 4: theta1"),
+        ({"sigma": None}, "sigma is None"),
+        ({"sigma": [0.1, 0.1, 0.0, 0.1]}, "sigma holds 0 at entry 3; give numbers above 0"),
+        ({"counts_per_rev": [0]}, "counts_per_rev holds 0 at entry 1"),
+        ({"torque_limit": [1.0, 2.0]}, "torque_limit has 2 entries; give 1, one per joint"),
+        ({"sample_period": 0}, "the arm's sample period is 0"),
+    ],
+    ids=lambda x: next(iter(x)) if isinstance(x, dict) else "",
+)  # fmt: skip
+def test_numbers_that_make_no_arm_are_refused(changed, says):
+    given = PENDULUM | {"theta": [0.05, 0.6, 0.02, 0.1], "sigma": [0.01] * 4} | changed
+    with pytest.raises(OptionError) as caught:
+        Arm(**given)
+    assert says in str(caught.value)

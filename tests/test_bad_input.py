@@ -111,6 +111,10 @@ TABLES: list[tuple[Case, Callable[[pl.DataFrame], pl.DataFrame]]] = [
     (Case("degrees against velocities", UnitError, ("57", "--units q=deg"), "q2"), times("q2", DEGREE)),
     (Case("velocities in degrees", UnitError, ("57", "--units dq=deg/s"), "dq1"), times("dq1", DEGREE)),
     (Case("degrees by their steps", UnitError, ("encoder count", "--units q=deg"), "q1"), small_degrees),
+    (
+        Case("encoder counts", UnitError, ("whole numbers", "--units q=counts"), "q1"),
+        lambda f: f.with_columns((pl.col("q1") * 1e4).round()).drop("dq1", "dq2"),
+    ),
     (Case("torque in N mm", UnitError, ("200", "torque limit"), "tau1"), times("tau1", 1e3)),
     (
         Case("nothing moves", LogShapeError, ("no joint moves",), "q1"),

@@ -15,7 +15,7 @@ import pytest
 
 import armgap
 from armgap import effects
-from armgap.log.conversion.units import FACTORS
+from armgap.log.conversion.units import COUNTED, FACTORS
 
 ROOT = Path(__file__).resolve().parents[1]
 LONGEST_EXAMPLE = 60  # lines
@@ -68,7 +68,7 @@ def test_every_public_name_exists_and_has_a_docstring():
 
 def test_formats_name_existing_effects_and_all_units():
     text = (ROOT / "docs" / "formats.md").read_text()
-    for unit in {u for units in FACTORS.values() for u in units}:
+    for unit in {u for units in FACTORS.values() for u in units} | set(COUNTED.values()):
         assert f"`{unit}`" in text
     known = {e["name"] for e in effects()}
     assert set(re.findall(r"`([a-z_]+):[0-9]*:[a-z]+=", text)) <= known

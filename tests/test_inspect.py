@@ -238,6 +238,90 @@ def test_a_mapping_that_is_wrong_is_refused_as_before(run, odd, tmp_path):
     assert not (tmp_path / "x.html").exists()
 
 
+def test_a_cell_that_is_no_number_is_no_question_of_names(run, frame, tmp_path):
+    path = tmp_path / "log.csv"
+    texts = ["ERR" if row == 77 else str(q) for row, q in enumerate(frame["q1"])]
+    frame.with_columns(q1=pl.Series(texts)).write_csv(path)
+    status, out, err = run("inspect", path)
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert "column `q1`, row 78: `ERR` is not a number" in err
+    assert "--columns" not in err
+
+
+def named(tmp_path, frame, names, *, counts=False):
+    """A log of one joint under names of a logger's own."""
+    q = (frame["q1"] / (2 * np.pi) * 4096).round() if counts else frame["q1"]
+    path = tmp_path / "own.csv"
+    pl.DataFrame({name: x for name, x in zip(names, (frame["t"], q, frame["tau1"]), strict=True)}).write_csv(path)
+    return path
+
+
+def test_units_of_names_are_listed_and_read(run, frame, tmp_path):
+    path = named(
+        tmp_path, frame.with_columns(pl.col("t", "q1", "tau1") * 1000), ("Timestamp_ms", "pos_mrad", "torque_mNm")
+    )
+    found = columns_of(path)
+    assert [c.unit for c in found.columns] == ["ms", "mrad", "mNm"]
+    assert (found.units, found.currents, found.problem) == ({}, {}, "")
+    status, out, _ = run("inspect", path, *shlex.split(found.options))
+    assert status == 0
+    assert "torques are in mNm, as the file says" in " ".join(out.split())
+
+
+@pytest.mark.parametrize(("name", "unit"), [("Motor Current [mA]", "mA"), ("current_A", "A"), ("motorCurrent", "")])
+def test_a_current_needs_a_factor(name, unit, run, frame, tmp_path):
+    path = named(tmp_path, frame, ("time", "pos", name))
+    found = columns_of(path)
+    assert found.currents == {"tau1": unit}
+    assert found.options.endswith("--factor tau1=VALUE")
+    status, out, _ = run("inspect", path)
+    assert status == 0
+    assert f"`{name}` is a current" in " ".join(out.split())
+    status, _, err = run("inspect", path, *shlex.split(found.options))
+    assert (status, err.count("\n")) == (2, 1)
+    assert "`VALUE` is not a number" in err
+    status, out, _ = run("inspect", path, *shlex.split(found.options.replace("VALUE", "0.5")))
+    assert status == 0
+    largest = 0.5 * frame["tau1"].max()
+    assert f"to {largest:.4g}" in " ".join(out.split())
+
+
+def test_the_present_position_is_no_current(frame, tmp_path):
+    found = columns_of(named(tmp_path, frame, ("time", "current_position", "effort")))
+    assert (found.proposed["q1"], found.currents) == ("current_position", {})
+
+
+def test_counts_are_proposed_with_what_they_need(run, frame, tmp_path):
+    path, arm_file = named(tmp_path, frame, ("time", "pos", "trq"), counts=True), tmp_path / "arm.toml"
+    text = 'kind = "pendulum"\nsample_period = 0.0025\n[inertial]\ntheta = [2.0, 9.0]\n[friction]\nviscous = [1.0]\ncoulomb = [1.0]\n'
+    arm_file.write_text(text)
+    status, out, _ = run("inspect", path, "--arm", arm_file)
+    assert status == 0
+    assert "add [encoder] counts_per_rev to the arm file" in " ".join(out.split())
+    arm_file.write_text(text + "[encoder]\ncounts_per_rev = [4096]\n")
+    found = columns_of(path, Arm.read(arm_file))
+    assert (found.units, found.problem) == ({"q": "counts"}, "")
+    status, out, _ = run("inspect", path, "--arm", arm_file, *shlex.split(found.options))
+    assert status == 0
+    assert "position step [rad] 0.001534" in " ".join(out.split())
+
+
+def test_what_stops_a_proposal_is_said(frame, tmp_path):
+    texts = ["ERR" if row == 77 else str(q) for row, q in enumerate(frame["q1"])]
+    found = columns_of(named(tmp_path, frame.with_columns(q1=pl.Series(texts)), ("time", "pos", "trq")))
+    assert "column `pos`, row 78: `ERR` is not a number" in found.problem
+
+
+def test_corrections_without_an_arm(run, frame, tmp_path):
+    frame.write_parquet(tmp_path / "log.parquet")
+    status, out, _ = run("inspect", tmp_path / "log.parquet", "--flip", "tau1")
+    assert status == 0
+    assert "read with --flip tau1" in " ".join(out.split())
+    status, _, err = run("inspect", tmp_path / "log.parquet", "--gravity", "reversed")
+    assert (status, err.count("\n")) == (2, 1)
+    assert "add --arm" in err
+
+
 def test_the_page_has_the_conventions_of_its_arm(arm, seed_log):
     page = render([inspect(seed_log, arm)])
     assert 'id="conventions"' in page

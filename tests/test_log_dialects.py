@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import polars as pl
 import pytest
 
-from armgap import Log
+from armgap import Arm, Log
 from armgap.arm.corrections import Corrections
 from armgap.cli.common import parse_columns
 from armgap.errors import ColumnError, LogReadError, OptionError, TimeError, UnitError
@@ -125,6 +128,53 @@ def test_stamps_since_1970_need_no_arm_and_lose_nothing(seed_log, frame):
     assert "times are in ns: they are stamps since 1970" in said(log, "units")
 
 
+def dates(frame: pl.DataFrame, offset: Callable[[int], str]) -> pl.DataFrame:
+    """The frame with dates as text in winter time until row 400 and in summer time from there on, each with its offset from UTC."""
+    start = np.datetime64("2026-03-29T00:59:59", "ns")
+    utc = start + (frame["t"] * 1e9).round().cast(pl.Int64).to_numpy().astype("timedelta64[ns]")
+    hours = np.where(np.arange(len(frame)) < 400, 1, 2)
+    local = utc + hours.astype("timedelta64[h]")
+    texts = [str(t).replace("T", " ")[:23] + offset(int(h)) for t, h in zip(local, hours, strict=True)]
+    return frame.with_columns(t=pl.Series(texts))
+
+
+@pytest.mark.parametrize("offset", ["+{:02d}:00", "+{:02d}00", "+{:02d}", " +{:02d}:00"])
+def test_dates_with_an_offset_from_utc(offset, seed_log, frame, tmp_path):
+    """As pandas, polars and databases write them; the change to summer time is no jump."""
+    path = tmp_path / "log.csv"
+    frame = frame.with_columns(pl.col("t") * 0.4)  # 1 ms, which three decimals hold
+    dates(frame, offset.format).write_csv(path)
+    np.testing.assert_allclose(Log.read(path).t, 0.4 * seed_log.t, atol=1e-9)
+
+
+def test_dates_as_pandas_writes_them(seed_log, frame, tmp_path):
+    pandas = pytest.importorskip("pandas")
+    path = tmp_path / "log.csv"
+    table = pandas.DataFrame({name: frame[name].to_numpy() for name in frame.columns})
+    table["t"] = pandas.to_datetime(table["t"], unit="s", utc=True).dt.round("us").dt.tz_convert("Europe/Berlin")
+    table.to_csv(path, index=False)
+    assert "+01:00" in path.read_text()
+    same(Log.read(path), seed_log, 1e-9)
+
+
+@pytest.mark.parametrize(
+    ("texts", "says"),
+    [
+        ({3: "ERR"}, "row 4: `ERR` is not a date, as the other times are"),
+        ({3: None}, "row 4: the value is missing"),
+        (dict.fromkeys(range(800), "05.01.2026 12:00:00,004"), "dates like 2026-01-05T12:00:00.004"),
+    ],
+    ids=["a word", "an empty cell", "other dates"],
+)
+def test_what_is_no_date_is_named_with_its_row(texts, says, frame):
+    changed = dates(frame, "+{:02d}:00".format)["t"].to_list()
+    for row, text in texts.items():
+        changed[row] = text
+    with pytest.raises(ColumnError) as caught:
+        Log.from_frame(frame.with_columns(t=pl.Series(changed)))
+    assert says in str(caught.value)
+
+
 def test_degrees_are_recognised_by_velocities_and_by_counts(seed_log, arm, frame):
     degrees = frame.with_columns(pl.col("q1", "q2") * DEGREE)
     log = Log.from_frame(degrees, arm=arm)
@@ -212,7 +262,7 @@ def test_units_of_counters_are_converted(frame, tmp_path):
 
 
 @pytest.mark.parametrize("mapped", [False, True])
-@pytest.mark.parametrize(("names", "column"), [("t,q1,tau1 [A]", "tau1 [A]"), ("t,q1 [counts],tau1", "q1 [counts]")])
+@pytest.mark.parametrize(("names", "column"), [("t,q1,tau1 [A]", "tau1 [A]"), ("t,q1 [gon],tau1", "q1 [gon]")])
 def test_a_unit_that_is_not_known_is_refused_until_it_is_declared(names, column, mapped, frame, tmp_path):
     path = tmp_path / "log.csv"
     path.write_text(header(frame.select("t", "q1", "tau1").write_csv(), names))
@@ -225,6 +275,105 @@ def test_a_unit_that_is_not_known_is_refused_until_it_is_declared(names, column,
     assert caught.value.column == column
     log = Log.read(path, columns={key: column}, units={key[:-1]: unit})
     np.testing.assert_array_equal(log.tau[:, 0], frame["tau1"].to_numpy())
+
+
+@pytest.mark.parametrize(
+    ("names", "factors"),
+    [
+        ("Timestamp_ms,pos_deg,torque_mNm", (1e3, DEGREE, 1e3)),
+        ("time s,elbow pos mrad,elbow torque Ncm", (1, 1e3, 1e2)),
+        ("t_us,angle_turns,torque_kgfcm", (1e6, 1 / (2 * math.pi), 1 / 0.0980665)),
+        ("t,q_rad,trq_nm", (1, 1, 1)),
+        # What also means something else, or is no unit of the column's quantity, is no unit: elbow of the right arm, motor m.
+        ("t,pos_m,torque_rev", (1, 1, 1)),
+        ("t,pos_ms,torque_deg", (1, 1, 1)),
+    ],
+)
+def test_units_behind_names_of_any_kind(names, factors, frame, tmp_path):
+    path = tmp_path / "log.csv"
+    f = frame.select(*(pl.col(name) * factor for name, factor in zip(("t", "q1", "tau1"), factors, strict=True)))
+    path.write_text(header(f.write_csv(), names))
+    log = Log.read(path, columns=dict(zip(("t", "q1", "tau1"), names.split(","), strict=True)))
+    for values, name in ((log.t, "t"), (log.q[:, 0], "q1"), (log.tau[:, 0], "tau1")):
+        np.testing.assert_allclose(values, frame[name].to_numpy(), rtol=1e-9, atol=1e-9)
+    assert ("as the file says" in said(log, "units")) == (factors != (1, 1, 1))
+
+
+def test_a_current_is_read_with_a_factor_alone(frame, tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text(header(frame.select("t", "q1", pl.col("tau1") * 50).write_csv(), "t,q1,i_q mA"))
+    columns = {"tau1": "i_q mA"}
+    with pytest.raises(
+        UnitError, match=r"`mA`, a unit that is not known.*--factor tau1=VALUE, N m at the joint per mA"
+    ):
+        Log.read(path, columns=columns)
+    arm = Arm(
+        "bench",
+        "pendulum",
+        9.81,
+        0.0025,
+        np.ones(4),
+        sigma=np.ones(4),
+        corrections=Corrections.parse(factor="tau1=0.02"),
+    )
+    log = Log.read(path, columns=columns, arm=arm)
+    np.testing.assert_allclose(log.tau[:, 0], frame["tau1"].to_numpy(), rtol=1e-12)
+
+
+def counter(**changed: Any) -> Arm:
+    """A pendulum with an encoder of 4096 counts per turn of the joint."""
+    return replace(
+        Arm("bench", "pendulum", 9.81, 0.0025, np.ones(4), sigma=np.ones(4), counts_per_rev=[4096]), **changed
+    )
+
+
+def in_counts(frame: pl.DataFrame, per_turn: float = 4096) -> pl.DataFrame:
+    return frame.select("t", (pl.col("q1") / (2 * math.pi) * per_turn).round().alias("q1"), "tau1")
+
+
+def test_positions_in_counts_are_converted_by_the_arm_file(frame):
+    for counts in (in_counts(frame), in_counts(frame).cast({"q1": pl.Int64})):
+        log = Log.from_frame(counts, arm=counter(), units={"q": "counts"})
+        assert np.max(np.abs(log.q[:, 0] - frame["q1"].to_numpy())) <= math.pi / 4096 + 1e-9
+        assert log.units["q1"] == "counts"
+    named = Log.from_frame(in_counts(frame).rename({"q1": "q1 [counts]"}), arm=counter())
+    np.testing.assert_array_equal(named.q, log.q)
+    assert "positions are in counts, as the file says" in said(named, "units")
+    speeds = in_counts(frame).with_columns(dq1=frame["dq1"] / (2 * math.pi) * 4096)
+    log = Log.from_frame(speeds, arm=counter(), units={"q": "counts", "dq": "counts/s"})
+    np.testing.assert_allclose(log.dq[:, 0], frame["dq1"].to_numpy(), rtol=1e-12)
+
+
+@pytest.mark.parametrize("per_turn", [100, 400, 4096, 36000])
+def test_positions_in_whole_numbers_are_counts(per_turn, frame):
+    """Whatever their number, with velocities in rad/s or without; degrees are offered as well, and never taken."""
+    counts = in_counts(frame, per_turn)
+    for f in (counts, counts.with_columns(frame["dq1"])):
+        for arm in (None, counter(counts_per_rev=None)):
+            with pytest.raises(
+                UnitError, match=r"moves in whole numbers.*\[encoder\] counts_per_rev.*counts per turn of the joint"
+            ):
+                Log.from_frame(f, arm=arm)
+        with pytest.raises(UnitError, match=r"looks like counts: add --units q=counts, or --units q=deg") as caught:
+            Log.from_frame(f, arm=counter(counts_per_rev=[per_turn]))
+        assert caught.value.column == "q1"
+    Log.from_frame(counts, units={"q": "deg"})
+
+
+def test_counts_without_their_number_per_turn_are_refused(frame):
+    for arm, says in ((None, "give an arm file with"), (counter(counts_per_rev=None), "bench does not say.*add")):
+        with pytest.raises(UnitError, match=f"is in counts, and .*{says} .*counts_per_rev.*times the gear ratio"):
+            Log.from_frame(in_counts(frame), arm=arm, units={"q": "counts"})
+    second = in_counts(frame).with_columns(q_link1=pl.col("q1"))
+    for table in (second, second.rename({"q_link1": "q_link1 [counts]"})):
+        with pytest.raises(UnitError, match=r"may not be in counts: counts_per_rev .* that of the encoder of `q1`"):
+            Log.from_frame(table, arm=counter(), units={"q": "counts"})
+    declared = second.rename({"q_link1": "q_link1 [counts]"}).with_columns(frame["q1"])
+    assert len(Log.from_frame(declared, arm=counter(), units={"q": "rad"})) == len(frame)
+    fine = second.with_columns(frame["q1"].alias("q_link1 [rad]")).drop("q_link1")
+    log = Log.from_frame(fine, arm=counter(), units={"q": "counts"})
+    assert log.q_link is not None
+    np.testing.assert_array_equal(log.q_link[:, 0], frame["q1"].to_numpy())
 
 
 def test_a_row_of_units_with_one_that_is_not_known_is_no_row_of_numbers(frame, tmp_path):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -117,8 +116,7 @@ def test_late_and_repeated_messages_are_counted(demo_log, demo_arm, tmp_path):
 
 
 def test_more_joints_than_the_arm_has_must_be_chosen(demo_log, tmp_path):
-    one = Arm.read(DEMO / "arm.toml")
-    pendulum = replace(one, kind="pendulum", theta=np.ones(4), sigma=np.ones(4))
+    pendulum = Arm("one", "pendulum", 9.81, 0.0025, np.ones(4), sigma=np.ones(4))
     path = mcap(demo_log.part(0, 100, "run"), tmp_path / "run")
     with pytest.raises(ColumnError, match=r"2 joints \(shoulder, elbow\), the arm has 1; .*q1=shoulder,tau1=shoulder"):
         Log.read(path, arm=pendulum)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import click
 import numpy as np
@@ -16,7 +17,12 @@ import pytest
 import armgap
 from armgap import CustomEffect, Log, diagnose, simulate
 from armgap.cli.files import InputFolder, OutputFile
+from armgap.diagnosis.comparison import Comparison
 from armgap.errors import OptionError
+from armgap.estimation.identification import Identification
+from armgap.inspection.inspection import Inspection
+from armgap.planning.planning import Plan
+from armgap.reproduction.experiment import Reproduction
 from armgap.simulation import Effect
 from commands import EVERY, armgap_process, called, parameters, refused, snapshot
 
@@ -238,3 +244,26 @@ def test_what_is_no_arm_is_refused(arm: Any) -> None:
     for call in calls:
         with pytest.raises(OptionError, match=r"the arm is .*not an Arm; give an Arm: Arm\.read"):
             call()
+
+
+@pytest.mark.parametrize("indent", ["x.json", Path("x.json"), -1, 2.5], ids=repr)
+@pytest.mark.parametrize(
+    "kind",
+    [armgap.Diagnosis, Comparison, Identification, Inspection, Plan, Reproduction],
+    ids=lambda kind: kind.__name__,
+)
+def test_a_result_as_text_takes_no_file(kind: Any, indent: Any) -> None:
+    """The first argument is the indentation, and the error says how a file is written."""
+
+    class Bare(kind):  # type: ignore[misc]
+        _data: ClassVar[dict[str, Any]] = {"a": 1}
+
+        def to_dict(self) -> dict[str, Any]:
+            return self._data
+
+    result = object.__new__(Bare)
+    assert json.loads(result.to_json(indent=2)) == {"a": 1}
+    with pytest.raises(OptionError) as caught:
+        result.to_json(indent)
+    wanted = 'import write; write("x.json", result.to_json())' if "json" in str(indent) else "whole number from 0 to 16"
+    assert wanted in str(caught.value)

@@ -4,16 +4,28 @@ from __future__ import annotations
 
 import math
 import operator
+import os
 from typing import Any
 
 from armgap.errors import OptionError
 
-__all__ = ["LARGEST_SEED", "LONGEST_PLAN_S", "SHORTEST_PLAN_S", "not_an_arm", "positive", "seed", "whole"]
+__all__ = [
+    "LARGEST_SEED",
+    "LONGEST_PLAN_S",
+    "SHORTEST_PLAN_S",
+    "indentation",
+    "not_an_arm",
+    "positive",
+    "seed",
+    "whole",
+]
 
 LARGEST_SEED = 2**64 - 1
 """Largest seed of the compiled core's random generator, which takes 64 bits."""
 SHORTEST_PLAN_S, LONGEST_PLAN_S = 2.0, 120.0
 """Shortest and longest motion that can be planned [s]: two phases with their moves, and predictions of minutes."""
+#: Widest indentation of JSON [blanks]: deeper levels would leave no room for values on a screen.
+_WIDEST_INDENT = 16
 
 
 def positive(value: Any, what: str, remedy: str = "give a positive number of seconds") -> float:
@@ -48,6 +60,24 @@ def whole(value: Any, what: str, least: int, most: int) -> int:
     if not least <= number <= most:
         raise OptionError(f"the {what} is {value}", remedy=f"give a whole number from {least} to {most}")
     return number
+
+
+def indentation(value: Any) -> int | None:
+    """Return the option `indent` of a method ``to_json``: a number of blanks from 0 to 16, or None for one line.
+
+    Raises
+    ------
+    OptionError
+        If the value is anything else, such as the name of a file.
+    """
+    if value is None:
+        return None
+    if isinstance(value, str | os.PathLike):
+        remedy = (
+            f'to write a file: from armgap.files.output import write; write("{os.fspath(value)}", result.to_json())'
+        )
+        raise OptionError(f"`indent` is {os.fspath(value)!r}, not a number of blanks", remedy=remedy)
+    return whole(value, "`indent`", 0, _WIDEST_INDENT)
 
 
 def seed(value: Any) -> int:

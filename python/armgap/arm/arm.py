@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from armgap import _native
 from armgap.errors import OptionError
 from armgap.literals import SERIAL, Side, TauKind
-from armgap.options import not_an_arm
+from armgap.options import not_an_arm, positive
 
 if TYPE_CHECKING:
     from armgap.arm.controller import Controller
@@ -70,21 +70,21 @@ class Arm:
         Acceleration of gravity [m/s^2].
     sample_period : float
         Nominal sample period [s].
-    theta, sigma : ndarray, shape (n_parameters,)
+    theta, sigma : array_like, shape (n_parameters,)
         Inertial base parameters, then viscous, then Coulomb coefficients per joint [SI], and the standard deviation of each. The inertial parameters
         of a serial arm are ten per link, see `armgap.arm.rigid_body`, then the rotors' inertias at the joints.
-    counts_per_rev : ndarray, shape (n_joints,), optional
-        Encoder counts per revolution (per metre on a linear joint).
-    torque_limit : ndarray, shape (n_joints,), optional
+    counts_per_rev : array_like, shape (n_joints,), optional
+        Encoder counts per turn of the joint, also for an encoder at the motor (per metre on a linear joint).
+    torque_limit : array_like, shape (n_joints,), optional
         Torque limit [N m].
-    link_length : ndarray, shape (n_joints,), optional
+    link_length : array_like, shape (n_joints,), optional
         Link lengths [m].
-    link_mass : ndarray, shape (n_joints,), optional
+    link_mass : array_like, shape (n_joints,), optional
         Link masses [kg]; not identifiable from motion, but needed by an export to a simulator.
     encoder_side, friction_side : tuple of {"motor", "link", "unknown"}, optional
         Per joint, the side of the transmission that the encoder measures and that friction acts on. For ``"unknown"``, an elastic or
         slack transmission is tried with both sides.
-    gear_ratio : ndarray, shape (n_joints,), optional
+    gear_ratio : array_like, shape (n_joints,), optional
         Turns of the motor per turn of the joint.
     columns : dict of str to str
         Names that the arm's logs use for ``t``, ``q1``, ``tau1`` and so on.
@@ -108,7 +108,14 @@ class Arm:
     Raises
     ------
     OptionError
-        If a serial arm has no chain, another kind has one, or `theta` does not suit it.
+        If the kind is not known, a serial arm has no chain or another kind has one, or an array does not have one finite number per parameter or
+        joint; the message names the known kinds, or the arm's parameters in their order.
+
+    Examples
+    --------
+    >>> arm = Arm("bench", "pendulum", 9.81, 0.004, [0.05, 0.6, 0.02, 0.1], sigma=[0.01, 0.1, 0.01, 0.05])
+    >>> arm.parameter_names
+    ('theta1', 'theta2', 'viscous1', 'coulomb1')
     """
 
     name: str
@@ -135,16 +142,49 @@ class Arm:
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        """Check that kind, chain and parameters of the arm are consistent with each other."""
+        """Make arrays of the numbers, and check that kind, chain and numbers of the arm are consistent with each other."""
+        if not isinstance(self.kind, str) or self.kind not in (*kinds(), SERIAL):
+            from armgap.arm.arm_file import suggest
+
+            raise OptionError(f"`{self.kind}` is not a kind of arm", remedy=suggest(str(self.kind), [*kinds(), SERIAL]))
         if (self.kind == SERIAL) != (self.chain is not None):
             raise OptionError(
                 f"an arm of kind `{self.kind}` and its chain do not fit", remedy='give kind "serial" a chain'
             )
-        if self.chain is not None and not len(self.theta) == len(self.sigma) == 13 * self.chain.n_joints:
-            raise OptionError(
-                f"theta has {len(self.theta)} entries, sigma {len(self.sigma)}",
-                remedy=f"give {13 * self.chain.n_joints}: ten per link, then rotor, viscous and Coulomb per joint",
-            )
+        positive(self.sample_period, "arm's sample period")
+        n = self.n_joints
+        every = f"{self.n_inertial + 2 * n}: {self._parameters_in_words()}"
+        self._make_array("theta", self.n_inertial + 2 * n, every, np.isfinite, "finite numbers")
+        self._make_array("sigma", self.n_inertial + 2 * n, every, lambda x: x > 0, "numbers above 0")
+        for name in ("counts_per_rev", "torque_limit", "link_mass", "gear_ratio", "link_length"):
+            if getattr(self, name) is not None:
+                fits = (lambda x: x >= 0) if name == "link_length" else (lambda x: x > 0)
+                self._make_array(name, n, f"{n}, one per joint", fits, "numbers above 0")
+
+    def _make_array(
+        self, name: str, count: int, wanted: str, fits: Callable[[NDArray[np.float64]], Any], which: str
+    ) -> None:
+        """Make an array of the numbers in a field; raise unless there are `count` of them, all finite and of the kind that `fits` accepts."""
+        given = getattr(self, name)
+        try:
+            values = np.asarray(given, dtype=np.float64)
+        except (TypeError, ValueError):
+            values = np.empty(())
+        if values.ndim == 0:
+            raise OptionError(f"{name} is {given!r}"[:120], remedy=f"give {wanted}")
+        if values.shape != (count,):
+            found = f"{len(values)} entries" if values.ndim == 1 else f"the shape {values.shape}"
+            raise OptionError(f"{name} has {found}", remedy=f"give {wanted}")
+        for i in np.flatnonzero(~(np.isfinite(values) & fits(values)))[:1]:
+            raise OptionError(f"{name} holds {values[i]:g} at entry {i + 1}", remedy=f"give {which}")
+        object.__setattr__(self, name, values)
+
+    def _parameters_in_words(self) -> str:
+        """Return what the entries of `theta` are, in their order."""
+        if self.chain is not None:
+            return "ten per link, then rotor, viscous and Coulomb per joint"
+        named = zip(self.parameter_names, self.parameter_units, strict=True)
+        return ", ".join(f"{name} [{unit}]" for name, unit in named)
 
     @classmethod
     def read(cls, path: str | Path) -> Arm:

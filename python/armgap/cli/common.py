@@ -21,6 +21,7 @@ from armgap.literals import GravityCorrection
 
 if TYPE_CHECKING:
     from armgap.arm.arm import Arm
+    from armgap.arm.corrections import Corrections
 
 __all__ = [
     "ManyValues",
@@ -36,6 +37,7 @@ __all__ = [
     "parse_units",
     "quiet_option",
     "read_arm",
+    "read_corrections",
     "report_option",
     "units_option",
 ]
@@ -103,13 +105,19 @@ def corrections_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return command
 
 
+def read_corrections(given: Mapping[str, Any]) -> Corrections:
+    """Read the command line's corrections of columns and gravity."""
+    from armgap.arm.corrections import Corrections
+
+    return Corrections.parse(**{name: given[name] for name in (*_CORRECTIONS, "gravity")})
+
+
 def read_arm(path: str, given: Mapping[str, Any]) -> Arm:
     """Read an arm file, with the command line's corrections of columns added to those of the file."""
     from armgap.arm.arm import Arm
-    from armgap.arm.corrections import Corrections
 
     arm = Arm.read(Path(path))
-    wanted = Corrections.parse(**{name: given[name] for name in (*_CORRECTIONS, "gravity")})
+    wanted = read_corrections(given)
     merged = wanted if arm.corrections is None else arm.corrections.merged(wanted)
     return wanted.on_arm(replace(arm, corrections=merged or None))
 

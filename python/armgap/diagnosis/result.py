@@ -10,6 +10,7 @@ from armgap.check.check import Check
 from armgap.diagnosis.dependence import Dependence, DependenceGrid, DependenceLaw, dependence
 from armgap.literals import ChainStage, Status, Verdict
 from armgap.log.findings import remarks
+from armgap.options import indentation
 from armgap.report.forms.notebook import NotebookDisplay
 
 __all__ = [
@@ -385,8 +386,19 @@ class Diagnosis(NotebookDisplay):
         return self._data
 
     def to_json(self, indent: int | None = None) -> str:
-        """Return the diagnosis as JSON, schema ``armgap.diagnosis/1``."""
-        return json.dumps(self._data, indent=indent, allow_nan=False)
+        """Return the diagnosis as JSON, schema ``armgap.diagnosis/1``.
+
+        Parameters
+        ----------
+        indent : int, optional
+            Blanks per level, 0 to 16; None for one line.
+
+        Raises
+        ------
+        OptionError
+            If `indent` is no such number. A file is written by ``armgap.files.output.write("x.json", diagnosis.to_json())``.
+        """
+        return json.dumps(self._data, indent=indentation(indent), allow_nan=False)
 
     @property
     def remarks(self) -> tuple[str, ...]:

@@ -17,6 +17,7 @@ from armgap.estimation.base_columns import BaseParameters
 from armgap.estimation.estimator import Estimator
 from armgap.literals import FILTERS, SCHEMES, VELOCITIES, Filters, Scheme, VelocityMethod
 from armgap.log.log import Log
+from armgap.options import indentation
 from armgap.progress import report_progress
 
 __all__ = ["SCHEMES", "Identification", "identify", "velocity"]
@@ -117,8 +118,19 @@ class Identification:
         }
 
     def to_json(self, indent: int | None = None) -> str:
-        """Return the identification as JSON, without time series."""
-        return json.dumps(self.to_dict(), indent=indent)
+        """Return the identification as JSON, without time series.
+
+        Parameters
+        ----------
+        indent : int, optional
+            Blanks per level, 0 to 16; None for one line.
+
+        Raises
+        ------
+        OptionError
+            If `indent` is no such number. A file is written by ``armgap.files.output.write("x.json", identification.to_json())``.
+        """
+        return json.dumps(self.to_dict(), indent=indentation(indent))
 
 
 def velocity(

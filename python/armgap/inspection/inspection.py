@@ -18,6 +18,7 @@ from armgap.inspection.sampling import Sampling, sampling
 from armgap.log import gather
 from armgap.log.findings import Finding
 from armgap.log.log import Log
+from armgap.options import indentation
 from armgap.progress import report_progress
 
 __all__ = ["Inspection", "inspect"]
@@ -86,8 +87,19 @@ class Inspection:
         return plain
 
     def to_json(self, indent: int | None = None) -> str:
-        """Return the inspection as JSON."""
-        return json.dumps(self.to_dict(), indent=indent, allow_nan=False)
+        """Return the inspection as JSON.
+
+        Parameters
+        ----------
+        indent : int, optional
+            Blanks per level, 0 to 16; None for one line.
+
+        Raises
+        ------
+        OptionError
+            If `indent` is no such number. A file is written by ``armgap.files.output.write("x.json", inspection.to_json())``.
+        """
+        return json.dumps(self.to_dict(), indent=indentation(indent), allow_nan=False)
 
 
 def inspect(log: Any, arm: Arm | None = None, *, repair: bool = True) -> Inspection:

@@ -39,8 +39,8 @@ def tables(found: Inspection) -> RenderableType:
     return Group(*parts)
 
 
-def column_table(found: Columns, file: str) -> RenderableType:
-    """Return a table for `rich` of a file without a mapping of columns: its columns, and a mapping to confirm."""
+def column_table(found: Columns, file: str, arm_file: str | None) -> RenderableType:
+    """Return a table for `rich` of a file without a mapping of columns, read beside an arm file or none: its columns, and a mapping to confirm."""
     from rich import box
     from rich.console import Group
     from rich.table import Table
@@ -51,5 +51,5 @@ def column_table(found: Columns, file: str) -> RenderableType:
         grid.add_column(name, overflow="fold")
     for row in words.column_rows(found):
         grid.add_row(*(Text(cell) for cell in row))
-    said = [Text(line, overflow="fold") for line in words.proposal(found, file)]
+    said = [Text(line, overflow="fold") for line in words.proposal(found, file, arm_file)]
     return Group(Text(found.log, style="bold"), grid, *said)

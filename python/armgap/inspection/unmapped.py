@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 import shlex
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,14 +16,17 @@ import polars as pl
 from numpy.typing import NDArray
 
 from armgap.errors import ArmgapError, UnitError
+from armgap.log.conversion.dates import nanoseconds
+from armgap.log.conversion.index import Index
+from armgap.log.conversion.spellings import current_of
+from armgap.log.conversion.units import FACTORS, has_factor
 from armgap.log.formats.all import record
 from armgap.log.log import Log
-from armgap.log.recording import Recording
 
 if TYPE_CHECKING:
     from armgap.arm.arm import Arm
 
-__all__ = ["Column", "Columns", "columns_of"]
+__all__ = ["FACTOR_PLACEHOLDER", "Column", "Columns", "columns_of"]
 
 #: Words in a column's name that suggest a quantity, in the order in which they are tried: "pos_vel" is a velocity, "target_position" no measurement.
 _WORDS: dict[str, re.Pattern[str]] = {
@@ -31,13 +34,15 @@ _WORDS: dict[str, re.Pattern[str]] = {
         r"(target|desired|des|ref|reference|setpoint|goal|temp|temperature|voltage|error|err|status|acc|acceleration)"
     ),
     "dq": re.compile(r"(dq[0-9]*|qd[0-9]*|qdot[0-9]*|vel|velocity|speed|omega|rate)"),
-    "tau": re.compile(r"(tau[0-9]*|torque|effort|trq|cmd|command|force|u[0-9]*|current)"),
+    "tau": re.compile(r"(tau[0-9]*|torque|effort|trq|cmd|command|force|u[0-9]*)"),
     "q": re.compile(r"(q[0-9]*|pos|position|angle|ang|theta[0-9]*|phi[0-9]*|enc|encoder|joint[0-9]*)"),
 }
 _TIME = re.compile(r"(t|time|stamp|timestamp|sec|secs|seconds|clock|ms|us|ns|nanosec)")
 _JOINT = ("q", "tau", "dq")
 #: Placeholder in a proposed mapping for a standard name without a suggested column.
 _PLACEHOLDER = "NAME"
+FACTOR_PLACEHOLDER = "VALUE"
+"""Placeholder in a proposed mapping for the factor that makes torques of a current."""
 
 
 @dataclass(frozen=True)
@@ -81,19 +86,27 @@ class Columns:
     proposed : dict
         Name of the suggested column for each standard name; ``"NAME"`` where no column is suggested.
     units : dict
-        Units by group that the proposed mapping needs, such as ``{"q": "deg"}``.
+        Units by group that the proposed mapping needs beside those that names and file state, such as ``{"q": "deg"}``.
+    currents : dict
+        Unit (``"mA"``; empty where the file states none) of each proposed torque that is a current by its name, by standard name; a torque is made of
+        it by a factor that only the user knows.
+    problem : str
+        Error with which reading by the proposed mapping and units ends; empty where it does not.
     """
 
     log: str
     columns: tuple[Column, ...]
     proposed: dict[str, str]
     units: dict[str, str]
+    currents: dict[str, str] = field(default_factory=dict)
+    problem: str = ""
 
     @property
     def options(self) -> str:
         """Proposed mapping as command-line options."""
         words = f"--columns {shlex.quote(_pairs(self.proposed))}"
-        return f"{words} --units {_pairs(self.units)}" if self.units else words
+        words += f" --units {_pairs(self.units)}" if self.units else ""
+        return words + "".join(f" --factor {key}={FACTOR_PLACEHOLDER}" for key in self.currents)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the columns and the proposed mapping as a JSON object, schema ``armgap.columns/1``."""
@@ -103,6 +116,8 @@ class Columns:
             "columns": [asdict(c) for c in self.columns],
             "proposed": self.proposed,
             "units": self.units,
+            "currents": self.currents,
+            "problem": self.problem,
             "options": self.options,
         }
 
@@ -123,17 +138,24 @@ def columns_of(path: str | Path, arm: Arm | None = None) -> Columns:
         If the file cannot be read.
     """
     recording, name, _ = record(path)
-    listed = tuple(_column(recording, column) for column in recording.columns)
+    index = Index(recording, name)
+    listed = tuple(_column(index, column) for column in recording.columns)
     proposed = _proposed(listed, None if arm is None else arm.n_joints)
-    return Columns(name, listed, proposed, _units(path, proposed, arm))
+    torques = {key: column for key, column in proposed.items() if key.startswith("tau") and not has_factor(key, arm)}
+    currents = {key: unit for key, column in torques.items() if (unit := current_of(column)) is not None}
+    units, problem = _units(path, proposed, arm)
+    return Columns(name, listed, proposed, units, currents, problem)
 
 
-def _column(recording: Recording, name: str) -> Column:
-    stream = recording.stream_of(name)
+def _column(index: Index, name: str) -> Column:
+    stream = index.recording.stream_of(name)
     series = stream.fetch(name)
-    unit = stream.units.get(name)
+    units = (unit for group in FACTORS for unit in (index.unit(name, group), index.foreign_unit(name, group)))
+    unit = next(filter(None, units), None)
     if series.dtype.is_temporal():
         series = series.to_physical()
+    elif (dates := nanoseconds(series)) is not None:
+        series = pl.Series(name, dates)
     if not series.dtype.is_numeric():
         numbers = series.cast(pl.Float64, strict=False) if series.dtype == pl.String else None
         if numbers is None or numbers.null_count() == len(numbers):
@@ -185,7 +207,7 @@ def _kind(column: Column) -> str | None:
     for kind, pattern in _WORDS.items():
         if any(pattern.fullmatch(w) for w in words):
             return None if kind == "skip" else kind
-    return None
+    return "tau" if current_of(column.name) is not None else None
 
 
 def _spread(name: str) -> str:
@@ -194,24 +216,21 @@ def _spread(name: str) -> str:
     return re.sub(r"(?<=[a-z]{2})(?=[0-9])", " ", apart)
 
 
-def _units(path: str | Path, proposed: dict[str, str], arm: Arm | None) -> dict[str, str]:
-    """Return the units, by group, that reading with the proposed mapping would ask for."""
+def _units(path: str | Path, proposed: dict[str, str], arm: Arm | None) -> tuple[dict[str, str], str]:
+    """Return the units, by group, that reading with the proposed mapping would ask for, and the error with which it would end all the same."""
     units: dict[str, str] = {}
     if _PLACEHOLDER in proposed.values() or str(path) == "-":
-        return units
-    for _ in range(3):  # at most three groups need a unit: times, positions, and velocities or torques
+        return units, ""
+    while True:  # each turn adds the unit of one more of the four groups, or is the last
         try:
             Log.read(path, columns=proposed, units=units, arm=arm)
-        except UnitError as error:
-            asked = re.search(r"--units (\w+)=([\w/]+)", error.remedy)
+        except ArmgapError as error:
+            asked = re.search(r"--units (\w+)=([\w/]+)", error.remedy) if isinstance(error, UnitError) else None
             if asked is None or asked[1] in units:
-                return units
+                return units, str(error)
             units[asked[1]] = asked[2]
-        except ArmgapError:
-            return units
         else:
-            return units
-    return units
+            return units, ""
 
 
 def _pairs(mapping: dict[str, str]) -> str:

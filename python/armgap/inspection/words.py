@@ -7,6 +7,8 @@ import shlex
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+from armgap.inspection.unmapped import FACTOR_PLACEHOLDER
+
 if TYPE_CHECKING:
     from armgap.inspection.channels import JointChannels
     from armgap.inspection.excitation import Excitation
@@ -150,14 +152,22 @@ def column_rows(found: Columns) -> list[tuple[str, ...]]:
     ]
 
 
-def proposal(found: Columns, file: str) -> list[str]:
-    """Return lines with a command that reads a file by the proposed mapping of its columns, and with what the user has to verify."""
+def proposal(found: Columns, file: str, arm_file: str | None) -> list[str]:
+    """Return lines with a command that reads a file by the proposed mapping of its columns, and with what the user has to verify or to add."""
+    beside = "" if arm_file is None else f"--arm {shlex.quote(arm_file)} "
     lines = [
         "not all of t, q1, tau1 and so on are there, and no mapping was given; by their names these may be meant:",
-        f"armgap inspect {shlex.quote(file)} {found.options}",
+        f"armgap inspect {shlex.quote(file)} {beside}{found.options}",
         "make sure of each: t times, q positions as measured, tau torques at the joint, positive where they turn the joint towards greater q",
     ]
     open_names = [key for key, name in found.proposed.items() if name == "NAME"]
     if open_names:
         lines.append(f"no column suggests itself for {', '.join(open_names)}: put its name in place of NAME")
+    for key, unit in found.currents.items():
+        lines.append(
+            f"`{found.proposed[key]}` is a current, of which no unit makes a torque: put its factor in place of {FACTOR_PLACEHOLDER}, "
+            f"N m at the joint per {unit or 'unit of the current'} (torque constant times gear ratio)"
+        )
+    if found.problem:
+        lines.append(f"read so it ends with: {found.problem}")
     return lines

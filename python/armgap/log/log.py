@@ -113,7 +113,7 @@ class Log:
         arm : Arm, optional
             Arm of the log; its joints, sample period and limits are checked too.
         units : mapping, optional
-            Units of the file where they are not SI: ``{"t": "ms", "q": "deg"}``, see `armgap.log.conversion.units.FACTORS`. A
+            Units of the file where they are not SI: ``{"t": "ms", "q": "deg"}``, see `armgap.log.conversion.units.FACTORS` and `COUNTED`. A
             group of columns whose unit is declared is not checked for its magnitude.
 
         Raises

@@ -177,8 +177,8 @@ class Plan:
         }
 
     def to_json(self, indent: int | None = None) -> str:
-        """Return the plan without its motion as JSON."""
-        return json.dumps(self.to_dict(), indent=indent, allow_nan=False)
+        """Return the plan without its motion as JSON; `indent` and errors are those of `armgap.Diagnosis.to_json`."""
+        return json.dumps(self.to_dict(), indent=options.indentation(indent), allow_nan=False)
 
     def to_polars(self) -> pl.DataFrame:
         """Return the motion as a table with the columns ``t, q_ref1, ..., dq_ref1, ..., tau_ff1, ...``."""

@@ -118,7 +118,7 @@ def _rows(kind: str, log: Data, si: Data) -> list[tuple[str, ...]]:
 
 
 def _row(kind: str, key: str, name: str, unit: str, si: Data) -> tuple[str, ...]:
-    from armgap.log.conversion.units import FACTORS
+    from armgap.log.conversion.units import COUNTED, FACTORS
 
     match = _KEY.fullmatch(key)
     group, joint = match.groups() if match else (key, "")
@@ -127,4 +127,6 @@ def _row(kind: str, key: str, name: str, unit: str, si: Data) -> tuple[str, ...]
     used = str(si.get(of_group, ""))
     factor = FACTORS.get(of_group, {}).get(unit, 1.0)
     converted = used if factor == 1.0 else f"{used}, times {factor:.4g}"
+    if unit == COUNTED.get(of_group):
+        converted = f"{used}, by counts_per_rev of the arm file"
     return key, words.get(group, "").format(joint), name, _SHOWN.get(unit, unit), converted

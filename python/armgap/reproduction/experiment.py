@@ -16,6 +16,7 @@ from armgap.arm.arm import Arm
 from armgap.estimation.identification import Identification, identify
 from armgap.literals import SCHEMES, Filters, Scheme, VelocityMethod
 from armgap.log.log import Log
+from armgap.options import indentation
 from armgap.simulation import Effect, seed_torque, simulate
 
 __all__ = ["LADDER", "PAPER_ESTIMATES", "PAPER_MEASURED", "Reproduction", "reproduce", "seed_arm", "seed_run"]
@@ -140,8 +141,19 @@ class Reproduction:
         }
 
     def to_json(self, indent: int | None = None) -> str:
-        """Return the reproduction of Reyes and Kelly (1997) as JSON: estimates, causes of their deviations from the measured values, findings."""
-        return json.dumps(self.to_dict(), indent=indent)
+        """Return the reproduction of Reyes and Kelly (1997) as JSON: estimates, causes of their deviations from the measured values, findings.
+
+        Parameters
+        ----------
+        indent : int, optional
+            Blanks per level, 0 to 16; None for one line.
+
+        Raises
+        ------
+        OptionError
+            If `indent` is no such number. A file is written by ``armgap.files.output.write("x.json", reproduction.to_json())``.
+        """
+        return json.dumps(self.to_dict(), indent=indentation(indent))
 
 
 def seed_arm() -> Arm:

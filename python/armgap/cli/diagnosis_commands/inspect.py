@@ -17,14 +17,17 @@ from armgap.cli.common import (
     parse_units,
     quiet_option,
     read_arm,
+    read_corrections,
     units_option,
 )
 from armgap.cli.files import Command, InputFile, OutputFile
 from armgap.cli.progress import working
+from armgap.errors import OptionError
 from armgap.files.output import is_stdout, write
 
 if TYPE_CHECKING:
     from armgap.arm.arm import Arm
+    from armgap.arm.corrections import Corrections
     from armgap.inspection.inspection import Inspection
     from armgap.inspection.unmapped import Columns
 
@@ -69,9 +72,14 @@ def command(
 
     naming = {"columns": parse_columns(columns), "units": parse_units(units)}
     arm = read_arm(arm_file, corrections) if arm_file is not None else None
+    of_logs = None if arm_file is not None else _of_logs(corrections)
     with working("reading", quiet=quiet):
         files = paths(logs)
-        options = {"listing": report_file is None, "repair": not no_repair}
+        options: dict[str, Any] = {
+            "listing": report_file is None,
+            "repair": not no_repair,
+            "corrections": of_logs,
+        }
         found = interruptible(lambda: [_inspected(path, arm, naming, **options) for path in files])
     if report_file is not None:
         from armgap.inspection.page import render
@@ -87,7 +95,7 @@ def command(
     say = console()
     for path, one in zip(files, found, strict=True):
         if isinstance(one, Columns):
-            say.print(column_table(one, str(path)))
+            say.print(column_table(one, str(path), arm_file))
             continue
         say.print(tables(one))
         for check in one.checks:
@@ -98,19 +106,36 @@ def command(
         say.print(f"report: {report_file}", highlight=False, markup=False)
 
 
+def _of_logs(given: dict[str, Any]) -> Corrections:
+    """Return the corrections of logs without an arm."""
+    if given["gravity"]:
+        raise OptionError("--gravity corrects an arm, and none is given", remedy="add --arm ARM.toml")
+    return read_corrections(given)
+
+
 def _inspected(
-    path: Path, arm: Arm | None, naming: dict[str, Any], *, listing: bool, repair: bool
+    path: Path,
+    arm: Arm | None,
+    naming: dict[str, Any],
+    *,
+    listing: bool,
+    repair: bool,
+    corrections: Corrections | None,
 ) -> Inspection | Columns:
-    """Return the inspection of a log; or, for unknown column names without a mapping, the columns with a proposed mapping."""
+    """Return the inspection of a log; or, for unknown column names without a mapping, the columns with a proposed mapping.
+
+    An error that names a row is about a cell of a column that was found, so a mapping is no remedy.
+    """
     from armgap.errors import ColumnError
     from armgap.inspection.inspection import inspect
     from armgap.inspection.unmapped import columns_of
     from armgap.log.log import Log
 
     try:
-        return inspect(Log.read(path, arm=arm, **naming), arm, repair=repair)
-    except ColumnError:
+        log = Log.read(path, arm=arm, **naming)
+        return inspect(log if corrections is None else corrections.on_log(log), arm, repair=repair)
+    except ColumnError as error:
         mapped = naming["columns"] or (arm is not None and arm.columns)
-        if mapped or not listing or str(path) == "-":
+        if mapped or error.row is not None or not listing or str(path) == "-":
             raise
         return columns_of(path, arm)

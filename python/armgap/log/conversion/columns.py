@@ -13,8 +13,10 @@ import polars as pl
 from numpy.typing import NDArray
 
 from armgap.errors import ColumnError, LogShapeError, SampleError, UnitError
+from armgap.log.conversion.dates import nanoseconds, odd_row
 from armgap.log.conversion.index import Index
 from armgap.log.conversion.joint_names import named_after_joints
+from armgap.log.conversion.spellings import is_current
 from armgap.log.findings import Finding
 from armgap.log.recording import Recording
 from armgap.progress import report_progress
@@ -46,8 +48,6 @@ OPTIONAL = {
 """Optional groups of columns, used only if every joint has one, with the words for each group in messages."""
 #: Largest number of columns that an error message lists.
 _LISTED_COLUMNS = 24
-# Dates as text, in UTC or without a time zone (ISO 8601).
-_DATE = r"^ *\d{4}-\d{2}-\d{2}[T ]\d{2}:\d{2}:\d{2}(\.\d{1,9})?Z? *$"
 _TICKS_S = {"ns": 1e-9, "us": 1e-6, "ms": 1e-3}
 
 
@@ -184,8 +184,8 @@ def _pick_all(index: Index, names: Mapping[str, str], mapping: Mapping[str, str]
     _check_once(index, found)
     return replace(
         found,
-        units={c: unit for _, c in found.pairs if (unit := index.unit(c)) is not None},
-        foreign_units={c: unit for _, c in found.pairs if (unit := index.foreign_unit(c)) is not None},
+        units={c: unit for key, c in found.pairs if (unit := index.unit(c, group_of(key))) is not None},
+        foreign_units={c: unit for key, c in found.pairs if (unit := index.foreign_unit(c, group_of(key))) is not None},
     )
 
 
@@ -380,6 +380,8 @@ def unknown_unit(column: str, unit: str, key: str, place: Path | str, *, mapped:
     mapping = "" if mapped else f"--columns {key}='{column}' "
     declared = {"t": "t=s", "q": "q=rad", "dq": "dq=rad/s", "tau": "tau=Nm"}[group]
     factor = f" and a factor with --factor {key}=VALUE" if group == "tau" else ""
+    if is_current(unit):
+        factor = f" and --factor {key}=VALUE, N m at the joint per {unit}: torque constant times gear ratio"
     return UnitError(
         f"is in `{unit}`, a unit that is not known",
         remedy=f"convert it in the file, or read it as it is with {mapping}--units {declared}{factor}",
@@ -420,16 +422,23 @@ def _times(
     if isinstance(series.dtype, pl.Datetime | pl.Duration) and series.null_count() == 0:
         # The type of the column states the unit of its times, so the unit need not be recognised.
         return series.to_physical().to_numpy().astype(np.int64), _TICKS_S[series.dtype.time_unit or "us"]
-    if series.dtype == pl.String and series.null_count() == 0 and series.str.contains(_DATE).all():
-        dates = series.str.strip_chars(" Z").to_numpy().astype("datetime64[ns]")
-        return dates.astype(np.int64), _TICKS_S["ns"]
+    if (dates := nanoseconds(series)) is not None:
+        return dates, _TICKS_S["ns"]
+    if (row := odd_row(series)) is not None:
+        what = (
+            "the value is missing"
+            if series[row] is None
+            else f"`{str(series[row])[:40]}` is not a date, as the other times are"
+        )
+        remedy = "correct it or drop the row; dates are written like 2026-01-05T12:00:00.004+01:00"
+        raise ColumnError(what, remedy=remedy, file=place, column=name, row=row + 1)
     if series.dtype.is_integer() and series.null_count() == 0:
         return series.cast(pl.Int64, wrap_numerical=True).to_numpy(), None
-    return _column(series, place, name), None
+    return _column(series, place, name, "give numbers, or dates like 2026-01-05T12:00:00.004"), None
 
 
-def _column(series: pl.Series, place: Path | str, name: str) -> NDArray[np.float64]:
-    series = _numbers(series, place, name)
+def _column(series: pl.Series, place: Path | str, name: str, remedy: str = "") -> NDArray[np.float64]:
+    series = _numbers(series, place, name, remedy or "correct it, or map another column")
     values = series.cast(pl.Float64).to_numpy()
     if series.null_count() == 0 and np.isfinite(values.sum()):
         return values
@@ -449,8 +458,8 @@ def _column(series: pl.Series, place: Path | str, name: str) -> NDArray[np.float
     return values
 
 
-def _numbers(series: pl.Series, place: Path | str, name: str) -> pl.Series:
-    """Return a column as numbers; texts that spell numbers are converted."""
+def _numbers(series: pl.Series, place: Path | str, name: str, remedy: str) -> pl.Series:
+    """Return a column as numbers; texts that spell numbers are converted, for other texts the error has the given remedy."""
     if series.dtype.is_numeric() or series.dtype == pl.Null:
         return series
     if series.dtype != pl.String:
@@ -467,10 +476,10 @@ def _numbers(series: pl.Series, place: Path | str, name: str) -> pl.Series:
     if len(bad):
         row = int(bad[0])
         more = f" (nor {'are' if len(bad) > 2 else 'is'} {len(bad) - 1} more)" if len(bad) > 1 else ""
-        comma = "," in str(series[row])
+        comma = re.fullmatch(r"[-+\d.eE]*,[-+\d.eE]*", texts[row]) is not None
         raise ColumnError(
             f"`{str(series[row])[:40]}` is not a number{more}",
-            remedy="write decimal points, not commas" if comma else "correct it, or map another column",
+            remedy="write decimal points, not commas" if comma else remedy,
             file=place,
             column=name,
             row=row + 1,

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from armgap.errors import ColumnError
-from armgap.log.conversion.spellings import foreign, is_foreign, stripped, suffixed
+from armgap.log.conversion.spellings import current_of, foreign, is_foreign, stripped, suffixed, unit_behind
 from armgap.log.recording import Recording
 
 __all__ = ["QUANTITIES", "Index"]
@@ -70,19 +70,24 @@ class Index:
                 return fits[0]
         return None
 
-    def unit(self, column: str) -> str | None:
-        """Return the unit that the file states for a column, in its metadata or in the column's name; None if it states none."""
+    def unit(self, column: str, group: str = "") -> str | None:
+        """Return the unit that the file states for a column, in its metadata or in the column's name; None if it states none.
+
+        In names of any kind, such as ``torque_mNm``, only the units of the given group of columns are read.
+        """
         stated = self.recording.stream_of(column).units.get(column)
         known = stated if stated is not None and not is_foreign(stated) else None
-        return known or stripped(column)[1] or suffixed(column)[1]
+        return known or stripped(column)[1] or suffixed(column)[1] or unit_behind(column, group)
 
-    def foreign_unit(self, column: str) -> str | None:
-        """Return the unit that the file states for a column where armgap does not know it; None otherwise."""
+    def foreign_unit(self, column: str, group: str = "") -> str | None:
+        """Return the unit that the file states for a column where armgap does not know it, as that of a current among torques; else None."""
         stated = self.recording.stream_of(column).units.get(column)
         if stated is not None and is_foreign(stated):
             return stated
         named = foreign(column)
-        return named[1] if named is not None else None
+        if named is not None:
+            return named[1]
+        return current_of(column) or None if group == "tau" and stated is None else None
 
     def in_foreign_unit(self, name: str) -> str | None:
         """Return the column that has a name but for a unit that armgap does not know, as ``tau1 [A]``; None if there is none."""

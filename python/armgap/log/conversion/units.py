@@ -19,7 +19,7 @@ from armgap.log.findings import Finding
 if TYPE_CHECKING:
     from armgap.arm.arm import Arm
 
-__all__ = ["FACTORS", "Scales", "check", "in_file", "recognised", "scaled", "si", "stated"]
+__all__ = ["COUNTED", "FACTORS", "Scales", "check", "has_factor", "in_file", "recognised", "scaled", "si", "stated"]
 
 _DEGREE = math.pi / 180
 
@@ -27,9 +27,12 @@ FACTORS: dict[str, dict[str, float]] = {
     "t": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},
     "q": {"rad": 1.0, "mrad": 1e-3, "deg": _DEGREE, "turns": 2 * math.pi, "m": 1.0, "mm": 1e-3},
     "dq": {"rad/s": 1.0, "mrad/s": 1e-3, "deg/s": _DEGREE, "rpm": math.pi / 30, "m/s": 1.0, "mm/s": 1e-3},
-    "tau": {"Nm": 1.0, "mNm": 1e-3, "N": 1.0, "kN": 1e3},
+    "tau": {"Nm": 1.0, "mNm": 1e-3, "Ncm": 1e-2, "kgfcm": 0.0980665, "N": 1.0, "kN": 1e3},
 }
-"""Factors to SI of the units that can be declared, by group of columns and unit."""
+"""Factors to SI of the units that can be declared, by group of columns and unit; for those in `COUNTED` the arm file has the factor."""
+
+COUNTED = {"q": "counts", "dq": "counts/s"}
+"""Units of an encoder's own by group of columns; one count is `Arm.encoder_step` [rad or m]."""
 
 WORDS = {"t": "times", "q": "positions", "dq": "velocities", "tau": "torques"}
 
@@ -41,6 +44,10 @@ _FARTHEST_M = 40.0
 _SPEED_SPAN_S = 0.02
 # Ratio of a differenced position to the velocity column that shows different units: 57.3 (degrees) or 1000 (mm), with a margin for noise.
 _DEGREE_RATIO = (40.0, 80.0)
+# Units of lengths, their velocities, and forces; all others that have one are of angles.
+_LINEAR = frozenset({"m", "mm", "m/s", "mm/s", "N", "kN"})
+# Number of changes of a position from which it is told whether all are whole encoder counts.
+_FEWEST_CHANGES = 20
 # Largest number of samples that determine the sample period, and whether positions change in whole encoder counts.
 _MAX_INSPECTED_SAMPLES = 100_000
 # Ratios of a differenced position to the velocity column that show degrees beyond doubt, and millimetres.
@@ -88,19 +95,28 @@ def stated(names: Names, declared: Mapping[str, str], arm: Arm | None, place: Pa
     OptionError
         If a declared group or its unit is unknown, or does not suit the arm.
     UnitError
-        If the file states a unit that is not known, or does not suit the column.
+        If the file states a unit that is not known, or does not suit the column; or if columns in encoder counts are declared or stated, and the arm
+        file does not say how many make a turn.
     """
-    by_user = {group: _factor(group, unit, arm) for group, unit in declared.items()}
+    for group, unit in declared.items():
+        _check_declared(group, unit, arm)
+    _check_second_encoders(names, declared, place)
     groups = {"t": (names.t,), "q": names.q, "tau": names.tau, "dq": names.dq or ()}
     for key, column in names.pairs:
-        if column in names.foreign_units and group_of(key) not in by_user:
+        if column in names.foreign_units and group_of(key) not in declared and not has_factor(key, arm):
             raise unknown_unit(column, names.foreign_units[column], key, place, mapped=True)
     findings: list[Finding] = []
-    settled = set(by_user)
+    settled = set(declared)
 
     def of(group: str, columns: tuple[str, ...]) -> NDArray[np.float64]:
-        if group in by_user:  # in an arm with rotary and linear joints a unit of angles does not change lengths
-            return np.where([_suits(group, declared[group], arm, j) for j in range(len(columns))], by_user[group], 1.0)
+        unit = declared.get(group)
+        counted = unit is not None and unit == COUNTED.get(group)
+        if unit is not None and not (counted and columns is names.q_link):
+            # In an arm with rotary and linear joints a unit of angles does not change lengths.
+            suits = [_suits(group, unit, arm, j) for j in range(len(columns))]
+            return np.array(
+                [_factor(group, unit, arm, place, c, j) if suits[j] else 1.0 for j, c in enumerate(columns)]
+            )
         factors = [_by_file(group, column, names.units.get(column), arm, place, j) for j, column in enumerate(columns)]
         units = {unit for column in columns if (unit := names.units.get(column)) is not None}
         if columns and columns is groups[group] and all(column in names.units for column in columns):
@@ -117,7 +133,7 @@ def stated(names: Names, declared: Mapping[str, str], arm: Arm | None, place: Pa
     t_tau = names.units.get(names.t_tau or "")
     return Scales(
         t=float(t[0]) if "t" in settled else None,
-        t_tau=by_user.get("t", FACTORS["t"].get(t_tau or "")),
+        t_tau=FACTORS["t"].get(declared.get("t", t_tau or "")),
         q=q,
         tau=tau,
         dq=dq if names.dq is not None else None,
@@ -154,32 +170,80 @@ def scaled(arrays: Arrays, scales: Scales) -> Arrays:
 def _by_file(group: str, column: str, unit: str | None, arm: Arm | None, place: Path | str, j: int) -> float:
     if unit is None:
         return 1.0
-    if unit not in FACTORS[group] or not _suits(group, unit, arm, j):
+    if unit not in _known(group) or not _suits(group, unit, arm, j):
         raise UnitError(
             f"is in {unit}, which is no unit of {WORDS[group]}" + (f" of a {arm.kind}" if arm is not None else ""),
             remedy=f"correct the file, or declare the unit with --units {group}=…",
             file=place,
             column=column,
         )
-    return FACTORS[group][unit]
+    return _factor(group, unit, arm, place, column, j)
 
 
-def _factor(group: str, unit: str, arm: Arm | None) -> float:
+def _known(group: str) -> list[str]:
+    """Return the units of a group of columns."""
+    return [*FACTORS[group], *([COUNTED[group]] if group in COUNTED else [])]
+
+
+def _factor(group: str, unit: str, arm: Arm | None, place: Path | str, column: str, j: int) -> float:
+    """Return the factor to SI of a known unit of a column of joint `j` (from 0)."""
+    if unit != COUNTED.get(group):
+        return FACTORS[group][unit]
+    if arm is None or arm.encoder_step is None:
+        problem = f"is in {unit}, and {_per_turn(arm, j)[0]}"
+        raise UnitError(problem, remedy=_per_turn(arm, j)[1], file=place, column=column)
+    return float(arm.encoder_step[j])
+
+
+def _per_turn(arm: Arm | None, j: int) -> tuple[str, str]:
+    """Return that the counts per turn of joint `j` (from 0) are not known, and what to do, in words."""
+    turn = "metre" if _slides(arm, j) else "turn of the joint (of the motor's encoder: times the gear ratio)"
+    if arm is None:
+        return (
+            "no arm says how many make a turn",
+            f"give an arm file with [encoder] counts_per_rev, the counts per {turn}",
+        )
+    name = str(arm.path or arm.name)
+    return (
+        f"{name} does not say how many make a turn",
+        f"add [encoder] counts_per_rev to the arm file, the counts per {turn}",
+    )
+
+
+def _check_second_encoders(names: Names, declared: Mapping[str, str], place: Path | str) -> None:
+    """Raise for positions on the link's side in counts: the arm file has the counts of one encoder per joint."""
+    by_user = declared.get("q")
+    for key, column in zip(names.q, names.q_link or (), strict=False):
+        by_file = names.units.get(column) if by_user in (None, COUNTED["q"]) else None
+        if (by_file or by_user) == COUNTED["q"]:
+            raise UnitError(
+                f"may not be in counts: counts_per_rev of the arm file is that of the encoder of `{key}`",
+                remedy=f"convert it in the file, and state its unit in its name: `{column.split(' ')[0]} [rad]`",
+                file=place,
+                column=column,
+            )
+
+
+def _check_declared(group: str, unit: str, arm: Arm | None) -> None:
     if group not in FACTORS:
         raise OptionError(f"`{group}` is not a group of columns", remedy=f"declare units of {', '.join(FACTORS)}")
-    if unit not in FACTORS[group]:
-        known = ", ".join(FACTORS[group])
-        raise OptionError(f"`{unit}` is not a unit of {group}", remedy=f"known: {known}")
+    if unit not in _known(group):
+        raise OptionError(f"`{unit}` is not a unit of {group}", remedy=f"known: {', '.join(_known(group))}")
     if arm is not None and not any(_suits(group, unit, arm, j) for j in range(arm.n_joints)):
         motion = "turns" if arm.rotary else "slides"
         raise OptionError(f"{group} in {unit} does not suit an arm that {motion}", remedy="declare another unit")
-    return FACTORS[group][unit]
+
+
+def has_factor(key: str, arm: Arm | None) -> bool:
+    """Whether the arm's corrections have a factor that makes torques of a column."""
+    factors = {} if arm is None or arm.corrections is None else arm.corrections.factor
+    return key in factors or key.rstrip("0123456789") in factors
 
 
 def _suits(group: str, unit: str, arm: Arm | None, j: int) -> bool:
     """Whether a unit is possible for a column of joint `j` (from 0)."""
-    angular = unit.startswith(("rad", "mrad", "deg", "turns", "rpm")) or unit.endswith("Nm")
-    return arm is None or group == "t" or j >= arm.n_joints or angular == arm.rotary_joints[j]
+    either = group == "t" or unit == COUNTED.get(group)
+    return arm is None or either or j >= arm.n_joints or (unit not in _LINEAR) == arm.rotary_joints[j]
 
 
 def recognised(arrays: Arrays, names: Names, arm: Arm | None, settled: frozenset[str]) -> tuple[Arrays, list[Finding]]:
@@ -215,7 +279,7 @@ def _degrees(arrays: Arrays, names: Names, arm: Arm | None) -> str:
             return ""
         if _moves_in_counts(arrays, arm, j, 1.0):
             return ""
-        if _moves_in_counts(arrays, arm, j, _DEGREE):
+        if _moves_in_counts(arrays, arm, j, _DEGREE) and not _in_whole_numbers(arrays.q[:, j]):
             reasons.append(f"`{name}` moves in whole encoder counts only if read so")
         elif ratio > 0 and names.dq is not None:
             reasons.append(f"`{name}` moves {ratio:.3g} times faster than `{names.dq[j]}` says")
@@ -270,11 +334,14 @@ def in_file(
 def _named(group: str, factor: float, spelt: str | None, arm: Arm | None, j: int) -> str:
     """Return the unit of a column with a given factor to SI: as the file spells it, or the units possible for the joint."""
     fits = [unit for unit, f in FACTORS[group].items() if math.isclose(f, factor) and _suits(group, unit, arm, j)]
+    fits = fits or [COUNTED.get(group, "")]
     return spelt if spelt in fits else " or ".join(fits)
 
 
 def check(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None, declared: frozenset[str]) -> None:
     """Raise `UnitError` where an unstated group of columns has the magnitude of another unit."""
+    if "q" not in declared:
+        _counts(arrays, place, names, arm)
     if "dq" not in declared:
         _velocity(arrays, place, names, arm)
     if "q" not in declared:
@@ -282,6 +349,26 @@ def check(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None, decl
     if "tau" not in declared:
         _torque(arrays, place, names, arm)
     _reference(arrays, place, names, arm)
+
+
+def _counts(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None) -> None:
+    """Raise if a position only takes whole numbers, as no motion in rad or m does: counts of an encoder, or rounded degrees or millimetres."""
+    for j, name in enumerate(names.q):
+        if not _in_whole_numbers(arrays.q[:, j]):
+            continue
+        low, high = arrays.q[:, j].min(), arrays.q[:, j].max()
+        other = "--units q=mm if they are millimetres" if _slides(arm, j) else "--units q=deg if they are degrees"
+        remedy = f"it looks like counts: add --units q=counts, or {other}"
+        if arm is None or arm.encoder_step is None:
+            remedy = f"for counts {_per_turn(arm, j)[1]}, and add --units q=counts; or add {other}"
+        problem = f"moves in whole numbers, from {low:.0f} to {high:.0f}, as an encoder counts"
+        raise UnitError(problem, remedy=remedy, file=place, column=name)
+
+
+def _in_whole_numbers(q: NDArray[np.float64]) -> bool:
+    """Whether a position moves, and takes whole numbers only."""
+    q = q[:_MAX_INSPECTED_SAMPLES]
+    return int(np.count_nonzero(np.diff(q))) >= _FEWEST_CHANGES and bool(np.all(q == np.rint(q)))
 
 
 def _velocity(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None) -> None:
@@ -379,7 +466,7 @@ def _moves_in_counts(arrays: Arrays, arm: Arm | None, j: int, factor: float) -> 
         return False
     moved = np.diff(arrays.q[:_MAX_INSPECTED_SAMPLES, j])
     moved = moved[moved != 0]
-    if len(moved) < 20:
+    if len(moved) < _FEWEST_CHANGES:
         return False
     counts = moved * factor / arm.encoder_step[j]
     whole = np.abs(counts - np.round(counts)) < 0.01

@@ -94,7 +94,9 @@ def _with_units(values: Iterable[float], units: Sequence[str]) -> str:
 
 def log_facts(log: Log) -> Facts:
     """Return the display of a log: columns with their ranges, and findings."""
-    rotary = {"rad": True, "deg": True, "m": False, "mm": False}.get(log.units.get("q1", ""))
+    rotary = {"rad": True, "mrad": True, "deg": True, "turns": True, "m": False, "mm": False}.get(
+        log.units.get("q1", "")
+    )
     units = si(rotary)
     rows = [("t", log.columns.get("t", ""), f"{figure(log.t[0])} to {figure(log.t[-1], 5)}", units["t"])]
     for group in COLUMNS:
