@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from armgap import Arm, Log, diagnose, simulate
+from armgap.arm.corrections import Corrections
 from armgap.check.serial.contradictions import contradictions
 from armgap.check.serial.dead_stretch import find
 from armgap.errors import OptionError
@@ -103,9 +104,26 @@ def test_an_arm_file_without_gravity(quiet: list[Log], arm_path: Path) -> None:
     assert corrections.on_arm(Arm.read(path)).chain.gravity.tolist() == [0.0, 0.0, -9.81]
 
 
-def test_standard_gravity_needs_masses() -> None:
-    from armgap.check import Corrections
+def test_an_angle_that_counts_from_the_world(quiet: list[Log], arm: Arm) -> None:
+    assert arm.chain is not None
+    assert arm.chain.parallel_joints == (3,)  # shoulder and elbow; the base turns about the vertical
+    wrong = Corrections(relative=("q3",))
+    corrections, [check] = contradictions([wrong.on_log(log) for log in quiet], arm)
+    assert (check.check, check.severity, check.joint) == ("relative_angle", "error", 3)
+    assert check.remedies == ("--absolute q3",)
+    for log in quiet:
+        np.testing.assert_allclose(corrections.on_log(wrong.on_log(log)).q, log.q, atol=1e-12)
 
+
+def test_angles_from_the_world_become_relative_link_by_link(quiet: list[Log]) -> None:
+    columns = ("q2", "q3")
+    world = Corrections(relative=columns).on_log(quiet[0])
+    np.testing.assert_allclose(world.q, np.cumsum(quiet[0].q, axis=1))
+    for order in (columns, columns[::-1]):
+        np.testing.assert_allclose(Corrections(absolute=order).on_log(world).q, quiet[0].q, atol=1e-12)
+
+
+def test_standard_gravity_needs_masses() -> None:
     pendulum = Arm("bench", "pendulum", 9.81, 0.004, np.array([0.1, 1.0, 0.1, 0.1]), sigma=np.full(4, 0.1))
     with pytest.raises(OptionError, match="pendulum"):
         Corrections(gravity="standard").on_arm(pendulum)

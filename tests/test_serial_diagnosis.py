@@ -373,3 +373,11 @@ def test_one_delay_of_all_joints_is_one_cause(arm: Arm) -> None:
     assert cause.effect in ("actuator_delay", "actuator_lag")
     assert cause.joints == (1, 2, 3)
     assert len(found.causes) == 1
+
+
+def test_friction_that_would_drive_its_joint_is_a_torque(arm: Arm) -> None:
+    # While the joint moves, Coulomb friction that differs by direction is the same torque; 1.5 N m of it would exceed the joint's 1 N m.
+    result = asked(logs(arm, Effect("torque_offset", 2, {"offset": 1.5})), arm)
+    assert [(c.effect, c.joint) for c in result.causes] == [("torque_offset", 2)]
+    assert result.causes[0].parameters["offset"].value == pytest.approx(1.5, rel=CLOSE)
+    assert result.gap.unexplained < CLOSE

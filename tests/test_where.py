@@ -9,6 +9,7 @@ import pytest
 
 from armgap import Arm, Diagnosis, Log, diagnose, simulate
 from armgap.cli.demo import CASE_FOLDER
+from armgap.simulation import Effect
 from swings import off, sines
 
 
@@ -40,3 +41,19 @@ def test_the_joint_with_the_residual_torque_is_the_first_place(joint, noise, cou
     assert result.verdict == "unexplained"
     assert result.where[0].joint == joint
     assert sum(place.share for place in result.where) == pytest.approx(1.0)
+
+
+def test_a_log_of_fifty_samples_per_second_shows_where() -> None:
+    arm = replace(Arm.read(CASE_FOLDER / "arm.toml"), sample_period=0.02, counts_per_rev=None)
+    t = np.arange(500) * arm.sample_period
+    effect = Effect("cubic_drag", 1, {"c3": 3.0})
+    given = [
+        simulate(arm, t, sines(t, seed), effects=[effect], noise=2e-5, seed=seed, name=str(seed)) for seed in (1, 2)
+    ]
+    result = diagnose(given[0], arm, holdout=given[1])
+    regimes = result.to_dict()["regimes"]
+    assert regimes
+    assert all(sum(regime["count"]) > 100 for regime in regimes)
+    position = next(r for r in regimes if r["variable"] == "q1")
+    travel = np.ptp(given[1].q[:, 0])
+    assert position["edges"][-1] - position["edges"][0] > 0.8 * travel

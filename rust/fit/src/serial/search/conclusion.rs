@@ -110,7 +110,9 @@ impl Search<'_> {
         let sigma = self.sigma_of(regression, model, &term);
         let mut alike: Vec<Term> = same.into_iter().map(|r| r.terms[last].clone()).collect();
         let including = self.candidates.iter().filter_map(|group| group.first());
-        for other in including.filter(|other| other.includes(&term, self.rotary.len())) {
+        let same_motion =
+            |other: &&Term| other.includes(&term, self.rotary.len()) || self.is_inverse_gain(other, &term);
+        for other in including.filter(same_motion) {
             if !alike.iter().any(|t| t.same_place(other)) {
                 alike.push(other.clone());
             }
@@ -122,6 +124,15 @@ impl Search<'_> {
         let mut named = Named { term, unfit: None, sigma, evidence, explained, probability, alike };
         named.unfit = named.reason_against(&self.rotary);
         named
+    }
+
+    /// Whether `other` is the torque gain of the one other joint that moves, where `term` is a torque gain too: with all of the arm's parameters in
+    /// proportion, the inverse gain there gives the same motion.
+    fn is_inverse_gain(&self, other: &Term, term: &Term) -> bool {
+        let rows = &self.training.rows().joints;
+        let moving: Vec<usize> = (0..rows.len()).filter(|j| !rows[*j].y.is_empty()).map(|j| j + 1).collect();
+        let of_one = |t: &Term| t.is_gain() && t.joint().is_some_and(|joint| moving.contains(&joint));
+        moving.len() == 2 && of_one(other) && of_one(term) && other.joint() != term.joint()
     }
 
     /// Standard deviations of the parameters of `term`, one of the terms of `model`, SI; infinite where the logs do not determine them.

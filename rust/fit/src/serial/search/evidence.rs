@@ -284,6 +284,20 @@ mod tests {
     }
 
     #[test]
+    fn a_torque_counts_where_it_acts() {
+        let signal = |torque: fn(usize) -> f64| vec![Some((0..ROWS).map(torque).collect::<Vec<f64>>())];
+        let joint =
+            JointRows { y: vec![1.0; ROWS], psi: vec![], block: vec![0; ROWS], floor: vec![0.1; ROWS] };
+        let rows = Rows { joints: vec![joint], parameters: 0, blocks: 1, independent: 10 };
+        let (always, at_times) = (signal(|_| 0.1), signal(|k| if k % 24 == 0 { 0.1 } else { 0.0 }));
+        for of in [&always, &at_times] {
+            assert!((where_it_acts(&rows, of) - 0.1).abs() < 1e-12);
+        }
+        assert!(consequence(&rows, &at_times) < 0.3 * consequence(&rows, &always));
+        assert_eq!(where_it_acts(&rows, &vec![None]), 0.0);
+    }
+
+    #[test]
     fn an_effect_in_two_blocks_of_twelve_is_confirmed() {
         let stop = |k: usize| if k / 20 == 3 || k / 20 == 8 { 0.5 } else { 0.0 };
         assert!(deviations(stop, stop) > HOLDOUT_DEVIATIONS);

@@ -384,3 +384,20 @@ pub fn of_load(p: &[f64]) -> [f64; 10] {
         m * (x * x + y * y),
     ]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use armgap_core::effect::find;
+
+    #[test]
+    fn friction_with_a_term_dissipates_or_drives() {
+        let dissipates = |name: &str, p: [f64; 3]| {
+            Term::of_law(EffectInstance::new(find(name).unwrap(), 0, p)).dissipates(&[1.0])
+        };
+        assert!(dissipates("coulomb_asymmetry", [0.9, 0.0, 0.0]));
+        assert!(!dissipates("coulomb_asymmetry", [-1.5, 0.0, 0.0]));
+        assert!(dissipates("stribeck", [3.0, 0.1, 0.0]) && !dissipates("stribeck", [-3.0, 0.1, 0.0]));
+        assert!(dissipates("torque_offset", [-9.0, 0.0, 0.0]), "a torque is no friction");
+    }
+}
