@@ -191,7 +191,7 @@ def test_lists_of_numbers_make_an_arm():
         ({"theta": 0.05}, "theta is 0.05"),
         ({"sigma": [0.1] * 5}, "sigma has 5 entries; give 4: theta1"),
         ({"sigma": None}, "sigma is None"),
-        ({"sigma": [0.1, 0.1, 0.0, 0.1]}, "sigma holds 0 at entry 3; give numbers above 0"),
+        ({"sigma": [0.1, 0.1, -0.1, 0.1]}, "sigma holds -0.1 at entry 3; give numbers from 0"),
         ({"counts_per_rev": [0]}, "counts_per_rev holds 0 at entry 1"),
         ({"torque_limit": [1.0, 2.0]}, "torque_limit has 2 entries; give 1, one per joint"),
         ({"sample_period": 0}, "the arm's sample period is 0"),

@@ -155,7 +155,7 @@ class Arm:
         n = self.n_joints
         every = f"{self.n_inertial + 2 * n}: {self._parameters_in_words()}"
         self._make_array("theta", self.n_inertial + 2 * n, every, np.isfinite, "finite numbers")
-        self._make_array("sigma", self.n_inertial + 2 * n, every, lambda x: x > 0, "numbers above 0")
+        self._make_array("sigma", self.n_inertial + 2 * n, every, lambda x: x >= 0, "numbers from 0")
         for name in ("counts_per_rev", "torque_limit", "link_mass", "gear_ratio", "link_length"):
             if getattr(self, name) is not None:
                 fits = (lambda x: x >= 0) if name == "link_length" else (lambda x: x > 0)

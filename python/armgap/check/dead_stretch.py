@@ -10,7 +10,7 @@ import numpy as np
 from armgap.arm.arm import Arm
 from armgap.check.check import Check
 from armgap.check.drive_limit import deliver, delivered
-from armgap.check.equation_error import EquationError, Rows, bounds
+from armgap.check.equation_error import Array, EquationError, Mask, Rows, bounds
 from armgap.log.log import SIGNALS, Log
 
 __all__ = ["DEAD_SHARE", "MISFIT_RATIO", "Run", "constant_torques", "dead_check", "find", "merged", "without_constant"]
@@ -28,6 +28,8 @@ DEAD_SHARE = 0.1
 _TOGETHER_S = 16.0
 # Part of a log outside stretches of constant torque from which the limits of the drives, and shifts, are estimated without these stretches.
 _LEAST_KEPT = 0.5
+# Largest break-away torque of a joint at rest, in Coulomb frictions, the larger of the arm file's and the estimated one.
+_BREAKAWAY = 2.0
 # Smallest number of rows of the equation of motion, inside and outside of a stretch, by which the stretch is judged.
 _MIN_STRETCH_ROWS = 30
 
@@ -107,7 +109,8 @@ def _judged(log: Log, rows: Rows, arm: Arm, runs: list[Run], near: list[Run]) ->
         return []
     known = rows.at(alive)
     base = EquationError([known], arm)
-    residual = rows.y - rows.psi @ base.fit(*bounds(arm)).theta
+    theta = base.fit(*bounds(arm)).theta
+    residual = _beyond_friction(rows.y - rows.psi @ theta, rows.moving(log), arm, theta)
     checks = []
     for j, first, last in near:
         inside = dead[:, j] & (rows.samples >= first) & (rows.samples <= last)
@@ -117,6 +120,12 @@ def _judged(log: Log, rows: Rows, arm: Arm, runs: list[Run], near: list[Run]) ->
         if within > MISFIT_RATIO * outside and within > DEAD_SHARE * float(base.scale[j]):
             checks.append(dead_check(log, (j, first, last), within, outside))
     return merged(checks)
+
+
+def _beyond_friction(residual: Array, moving: Mask, arm: Arm, theta: Array) -> Array:
+    """Return the residual torque beyond the friction that may hold a joint at rest: a controller that holds a joint gives it a constant torque."""
+    holding = _BREAKAWAY * np.maximum(theta, arm.theta)[arm.n_inertial + arm.n_joints :]
+    return np.where(moving, residual, np.sign(residual) * np.maximum(np.abs(residual) - holding, 0.0))
 
 
 def dead_check(log: Log, run: Run, within: float, outside: float) -> Check:

@@ -21,6 +21,7 @@ from armgap.check.stage import unexplained_columns
 from armgap.check.time_shift import causal, early, explains_better, taken_back
 from armgap.diagnosis.custom_effect import CustomEffect, TorqueTables, check_effects
 from armgap.diagnosis.drive_chain import drive_chain
+from armgap.diagnosis.equivalents import beside, low_pass, speed_limit, torque_loop
 from armgap.diagnosis.prepared_input import PreparedInput, prepare, refused
 from armgap.diagnosis.result import Diagnosis
 from armgap.diagnosis.serial_settings import serial_settings
@@ -164,12 +165,14 @@ def _diagnose(given: PreparedInput, settings: dict[str, Any], effects: Sequence[
     if contradictory:
         data = _contradicted(data)
     data["arm"]["name"] = arm.name
+    speed_limit(data, (*training, *held))
     for cause in (*data["causes"], *data["candidates"]):
         if "log" in cause:
             cause["log"] = _WHOLE.sub("", cause["log"])
     data["notes"] = [*given.notes, *data["notes"]]
     checks = [*given.checks, *(_ambiguous_delay(data, training, arm) or _hidden_delay(data, given))]
-    _ambiguous_lag(data, given.checks)
+    low_pass(data, given.checks)
+    torque_loop(data)
     data["checks"] = [check.to_dict() for check in checks]
     known, corrected_logs = tables.applied(data, (*training, *held))
     count = len(training)
@@ -246,7 +249,7 @@ def _ambiguous_delay(data: dict[str, Any], training: list[Log], arm: Arm) -> lis
         return []
     for cause in data["causes"]:
         if cause["effect"] == "actuator_delay":
-            cause["equivalents"].append(_beside("time_shift", None, "torques early in the file by as much"))
+            cause["equivalents"].append(beside("time_shift", None, "torques early in the file by as much"))
     return [check]
 
 
@@ -268,23 +271,6 @@ def _columns(data: dict[str, Any], given: PreparedInput) -> list[Check]:
     moving = [(after, motion) for after, motion in zip(gap["after"], gap["motion"], strict=True) if motion > 0.0]
     relative = max((after / motion for after, motion in moving), default=0.0)
     return unexplained_columns(given.training, given.holdout, given.arm, gap["horizon_s"], relative)
-
-
-def _ambiguous_lag(data: dict[str, Any], checks: Sequence[Check]) -> None:
-    """Add a low-pass of the positions to the equivalents of causes that delay a joint's torque; each gets half of the probability."""
-    joints = {check.joint for check in checks if check.check == "filtered_positions"}
-    for cause in data["causes"]:
-        found = {j for j in cause.get("joints") or [cause["joint"]] if j in joints}
-        if found and cause["effect"] in ("actuator_lag", "actuator_delay"):
-            cause["probability"] *= 0.5
-            for joint in sorted(found):
-                why = f"q{joint} is smoother than its encoder: a low-pass before logging delays positions as much"
-                cause["equivalents"].append(_beside("filtered_positions", joint, why))
-
-
-def _beside(name: str, joint: int | None, why: str) -> dict[str, Any]:
-    """Return a defect of the log as an entry of a cause's equivalents; no motion tells it from the cause."""
-    return {"effect": name, "joint": joint, "why": why, "motion_separates": False}
 
 
 def _contradicted(data: dict[str, Any]) -> dict[str, Any]:

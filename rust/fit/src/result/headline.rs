@@ -126,12 +126,14 @@ fn sorted_causes<const N: usize, const P: usize>(
     attribution: &Attribution<N, P>,
     most: usize,
 ) -> (Vec<Cause>, Vec<Unnamed<Cause>>) {
-    let why_not = |c: &Cause| {
-        let part = part_at_its_shape(&attribution.model, &c.effect);
-        let sigma: Vec<f64> = c.sigma.iter().map(|sigma| sigma * part).collect();
-        unfit(&c.effect, &sigma, c.probability)
-    };
-    sorted(attribution.causes.clone(), most, why_not)
+    sorted(attribution.causes.clone(), most, |cause| unfit_in(&attribution.model, cause))
+}
+
+/// Why a cause with the values and standard deviations of a model is not to be named; none if it may be.
+fn unfit_in<const P: usize>(model: &Fit<P>, cause: &Cause) -> Option<String> {
+    let part = part_at_its_shape(model, &cause.effect);
+    let sigma: Vec<f64> = cause.sigma.iter().map(|sigma| sigma * part).collect();
+    unfit(&cause.effect, &sigma, cause.probability)
 }
 
 /// Standard deviation of an effect's size at given values of its shape, as a part of its standard deviation; 1 if the effect has no shape, or the model does
@@ -209,8 +211,20 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         self.set_pushes(&disturbances);
         changed |= !candidates.is_empty();
         let (mut model, mut weights, mut open) = self.reported(&attribution, &causes, &disturbances, changed);
-        let worse =
-            if open && !causes.is_empty() { self.worse(&attribution, &model, &weights) } else { None };
+        // Without those that are not named, the others may have no size any more.
+        while changed && !causes.is_empty() {
+            refresh(&model, &mut causes);
+            let (named, lost) = sorted(causes, most, |cause| unfit_in(&model, cause));
+            causes = named;
+            if lost.is_empty() {
+                break;
+            }
+            candidates.extend(lost);
+            (model, weights, open) = self.reported(&attribution, &causes, &disturbances, true);
+        }
+        // The model search closed the gap with what is not named, too.
+        let asked = (open || changed) && !causes.is_empty();
+        let worse = if asked { self.worse(&attribution, &model, &weights) } else { None };
         if let Some(than) = worse {
             withhold(&mut causes, &mut candidates, than);
             (model, weights, open) = self.reported(&attribution, &causes, &disturbances, true);

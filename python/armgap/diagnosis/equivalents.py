@@ -1,0 +1,101 @@
+"""What a cause may be instead, which no effect of the library is: equivalents that are added to the causes of a diagnosis."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armgap.check.check import Check
+from armgap.log.log import Log
+
+__all__ = ["beside", "low_pass", "speed_limit", "torque_loop"]
+
+Array = NDArray[np.float64]
+
+#: Probability of a cause beside an equivalent that is as likely a priori, as a part of its probability without it.
+_AS_LIKELY = 0.5
+#: Shares of a log, by the mean power of the drive and by its mean torque over as long a time, below those in which a push is what a limit that falls
+#: with the speed does. Of 19 such events on three simulated arms all have 0.94 and 0.90 or more; of five pushes on a real arm none has.
+_POWERFUL, _STRONG = 0.94, 0.9
+#: Time over which velocities are averaged [s].
+_SPEED_S = 0.01
+
+
+def beside(name: str, joint: int | None, why: str, *, separates: bool = False) -> dict[str, Any]:
+    """Return an entry of a cause's equivalents for what is no effect of the library; `separates` tells whether a motion tells it from the cause."""
+    return {"effect": name, "joint": joint, "why": why, "motion_separates": separates}
+
+
+def low_pass(data: dict[str, Any], checks: Sequence[Check]) -> None:
+    """Add a low-pass of the positions to the equivalents of causes that delay a joint's torque; each gets half of the probability."""
+    joints = {check.joint for check in checks if check.check == "filtered_positions"}
+    for cause in data["causes"]:
+        found = {j for j in cause.get("joints") or [cause["joint"]] if j in joints}
+        if found and cause["effect"] in ("actuator_lag", "actuator_delay"):
+            cause["probability"] *= _AS_LIKELY
+            for joint in sorted(found):
+                why = f"q{joint} is smoother than its encoder: a low-pass before logging delays positions as much"
+                cause["equivalents"].append(beside("filtered_positions", joint, why))
+
+
+def torque_loop(data: dict[str, Any]) -> None:
+    """Add an underdamped torque loop to the equivalents of an elastic joint beside a delay or lag of the same joint.
+
+    A rotor without inertia behind a spring filters the torque by ``(2 z s/w + 1) / (s^2/w^2 + 2 z s/w + 1)``, and with a lag of ``2 z/w`` it is a
+    torque loop of second order. The two are the same where the logs do not tell the rotor's inertia from none and the encoder is at the link.
+    """
+    late = {c["joint"] for c in data["causes"] if c["effect"] in ("actuator_lag", "actuator_delay")}
+    for cause in data["causes"]:
+        if cause["effect"] != "joint_elasticity" or cause["joint"] not in late:
+            continue
+        rotor = cause["parameters"].get("rotor_inertia")
+        at_link = (cause.get("sides") or {}).get("encoder") != "motor"
+        if at_link and rotor is not None and not rotor["sigma"] < rotor["value"]:
+            cause["probability"] *= _AS_LIKELY
+            why = "with the delay or lag beside it: the rotor's inertia is not told from none, and a torque loop of second order does the same"
+            cause["equivalents"].append(beside("torque_loop_resonance", cause["joint"], why))
+
+
+def speed_limit(data: dict[str, Any], logs: Sequence[Log]) -> None:
+    """Add a limit of the torque that falls with the speed to the equivalents of pushes that are what such a limit does.
+
+    A push counts if it acts against the command while the drive gives nearly as much power and torque as anywhere in the log. The probability is
+    halved, and halved again for each further such push on the same joint, as pushes come at any time.
+    """
+    by_name = {log.name: log for log in logs}
+    pushes = [c for c in data["causes"] if c.get("log") in by_name and c["joint"] is not None]
+    found = [cause for cause in pushes if _is_limit(cause, by_name[cause["log"]])]
+    count = Counter(cause["joint"] for cause in found)
+    for cause in found:
+        cause["probability"] *= _AS_LIKELY ** count[cause["joint"]]
+        why = (
+            "it acts against the command where the drive gives nearly as much power as anywhere in the log: a limit that falls with the speed, as by "
+            "the supply voltage, does the same, and comes back when the motion is repeated"
+        )
+        cause["equivalents"].append(beside("torque_speed_limit", cause["joint"], why, separates=True))
+
+
+def _is_limit(push: dict[str, Any], log: Log) -> bool:
+    time, duration, impulse = (float(push["parameters"][name]["value"]) for name in ("time", "duration", "impulse"))
+    j = push["joint"] - 1
+    during = np.abs(log.t - time) <= 0.5 * duration
+    if not during.any():
+        return False
+    tau = log.tau[:, j]
+    speed = _mean(np.gradient(log.q[:, j], log.t), round(_SPEED_S / log.sample_period))
+    against = impulse * float(tau[during].mean()) < 0.0
+    samples = int(during.sum())
+    ranks = [
+        float(np.mean(_mean(x, samples) < x[during].mean())) for x in (tau * speed, np.sign(tau[during].sum()) * tau)
+    ]
+    return against and ranks[0] >= _POWERFUL and ranks[1] >= _STRONG
+
+
+def _mean(x: Array, samples: int) -> Array:
+    """Return the running mean over some samples, at least one."""
+    width = max(samples, 1)
+    return np.convolve(x, np.full(width, 1.0 / width), "same")
