@@ -118,3 +118,30 @@ def test_a_joint_that_sticks_behind_a_limited_drive_is_of_this_arm(arm: Arm) -> 
     within = EquationError([r.within(r.moving(log)) for log, r in zip(logs, base.rows, strict=True)], arm)
     low, high = bounds(arm)
     assert within.of_torques(within.fit(low, high)).share[1] < 0.1 * base.of_torques(base.fit(low, high)).share[1]
+
+
+def dwelling(arm: Arm, held: float, weight: float) -> list[Log]:
+    """Return two logs of strokes of an axis with dwells between them, whose torque is constant: `held` Coulomb frictions above the weight."""
+    t = np.arange(5000) * arm.sample_period
+    logs = []
+    for seed in (1, 2):
+        phase, cycle = np.random.default_rng(seed).uniform(0.0, 6.28), t % 2.5
+        stroke = 70.0 * np.sin(2 * np.pi * cycle / 1.25) + 5.0 * np.sin(9.0 * t + phase)
+        tau = weight + np.where(cycle < 1.25, stroke, held * arm.theta[-1])
+        logs.append(simulate(arm, t, tau, noise=0.0, seed=seed, name=f"run {seed}"))
+    return logs
+
+
+@pytest.mark.parametrize("held", [0.9, -0.9])
+def test_a_torque_that_holds_a_joint_against_dry_friction_is_not_missing(axis: Arm, held: float) -> None:
+    arm = replace(axis, theta=np.array([12.8, 0.0, 42.0, 21.6]))
+    assert not any(c.check == "dead_stretch" for c in checked(dwelling(arm, held, 0.0), arm))
+
+
+def test_a_torque_that_is_missing_while_the_joint_bears_a_load_is_still_found(axis: Arm) -> None:
+    arm = replace(axis, theta=np.array([12.8, 120.0, 42.0, 21.6]))
+    logs = dwelling(arm, 0.9, 120.0)
+    dead = logs[0].tau.copy()
+    dead[np.flatnonzero((logs[0].t > 1.3) & (logs[0].t < 2.4))] = 0.0
+    found = checked([replace(logs[0], tau=dead), logs[1]], arm)
+    assert [c.check for c in found if c.severity == "error"] == ["dead_stretch"]

@@ -287,6 +287,10 @@ def verdict(data: Data) -> str:
         return "The arm does something that its model leaves out, and part of the gap stays unexplained."
     if none_allowed(data):
         return "There is a gap; no cause was allowed, so none is named."
+    if data["verdict"] == "none" and exceeds_floor(data, "after"):
+        return (
+            "The model predicts this arm nearly as well as the logs can tell; what is left is small beside its motion."
+        )
     return _VERDICTS.get(data["verdict"], str(data["verdict"]))
 
 

@@ -5,6 +5,7 @@ use crate::serial::search::{Motion, Search};
 use crate::serial::term::row_term::{RowLaw, RowTerm};
 use crate::serial::term::{Term, TermKind};
 use crate::serial::weak_form::rows::{Estimate, Regression, Signal, sum};
+use armgap_core::chain::LINK_PARAMETERS;
 use rayon::prelude::*;
 
 /// Relative step of a parameter in numerical derivatives of a term's torque.
@@ -43,6 +44,12 @@ impl Fitted {
 }
 
 impl Search<'_> {
+    /// Whether friction with the term of index `index` dissipates beside the model's Coulomb friction ([`Term::dissipates`]).
+    pub(in crate::serial) fn dissipates(&self, model: &Fitted, index: usize) -> bool {
+        let first = (LINK_PARAMETERS + 2) * self.rotary.len();
+        model.terms[index].dissipates(model.estimate.theta.get(first..).unwrap_or_default())
+    }
+
     /// Sum of the torques of `terms` along the logs of `motion` at the arm's parameters `theta`, by joint and row, N m or N.
     pub(in crate::serial) fn beside(&self, motion: &dyn Motion, terms: &[Term], theta: &[f64]) -> Signal {
         if terms.is_empty() {

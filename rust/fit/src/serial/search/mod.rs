@@ -18,7 +18,6 @@ use crate::serial::search::screening::Guess;
 use crate::serial::term::Term;
 use crate::serial::term::table::Table;
 use crate::serial::weak_form::rows::{Prior, Regression, Rows, Signal};
-use armgap_core::chain::LINK_PARAMETERS;
 
 /// Rows of an arm's weak equation of motion along a set of logs, and torques of terms along these logs.
 pub trait Motion: Sync {
@@ -136,12 +135,15 @@ impl Search<'_> {
         let screened = self.screened_by_likelihood(guesses, regression, model);
         let single = self.finalists(regression, model, &screened);
         let last = model.terms.len();
-        let accepted = single.into_iter().filter(|with| {
-            self.evidence(regression, model, with, last).is_accepted()
-                && self.dissipates(&with.terms[last], with)
-        });
+        let stands = |with: &Fitted| {
+            self.evidence(regression, model, with, last).is_accepted() && self.dissipates(with, last)
+        };
         let on_several = self.on_several_joints(regression, model, &screened, ARM_WIDE_FINALISTS);
-        let best = accepted.chain(on_several).min_by(|a, b| a.total().total_cmp(&b.total()))?;
+        let best = single
+            .into_iter()
+            .filter(stands)
+            .chain(on_several)
+            .min_by(|a, b| a.total().total_cmp(&b.total()))?;
         Some(best.terms[last].clone())
     }
 
@@ -153,12 +155,6 @@ impl Search<'_> {
         index: usize,
     ) -> bool {
         !self.is_sampling(&with.terms[index]) && self.evidence(regression, without, with, index).is_accepted()
-    }
-
-    /// Whether friction with a term dissipates beside the Coulomb friction of a model ([`Term::dissipates`]).
-    fn dissipates(&self, term: &Term, model: &Fitted) -> bool {
-        let first = (LINK_PARAMETERS + 2) * self.rotary.len();
-        term.dissipates(model.estimate.theta.get(first..).unwrap_or_default())
     }
 
     /// Whether a term is a delay or lag of less than a sample period on all of its joints.
