@@ -44,10 +44,16 @@ impl Fitted {
 }
 
 impl Search<'_> {
-    /// Whether friction with the term of index `index` dissipates beside the model's Coulomb friction ([`Term::dissipates`]).
-    pub(in crate::serial) fn dissipates(&self, model: &Fitted, index: usize) -> bool {
-        let first = (LINK_PARAMETERS + 2) * self.rotary.len();
-        model.terms[index].dissipates(model.estimate.theta.get(first..).unwrap_or_default())
+    /// Whether the evidence accepts the term of index `index` in the model `with`, and friction with it dissipates ([`Term::dissipates`]).
+    pub(in crate::serial) fn stands(
+        &self,
+        regression: &Regression,
+        [without, with]: [&Fitted; 2],
+        index: usize,
+    ) -> bool {
+        let coulomb = with.estimate.theta.get((LINK_PARAMETERS + 2) * self.rotary.len()..);
+        self.evidence(regression, without, with, index).is_accepted()
+            && with.terms[index].dissipates(coulomb.unwrap_or_default())
     }
 
     /// Sum of the torques of `terms` along the logs of `motion` at the arm's parameters `theta`, by joint and row, N m or N.

@@ -135,15 +135,9 @@ impl Search<'_> {
         let screened = self.screened_by_likelihood(guesses, regression, model);
         let single = self.finalists(regression, model, &screened);
         let last = model.terms.len();
-        let stands = |with: &Fitted| {
-            self.evidence(regression, model, with, last).is_accepted() && self.dissipates(with, last)
-        };
         let on_several = self.on_several_joints(regression, model, &screened, ARM_WIDE_FINALISTS);
-        let best = single
-            .into_iter()
-            .filter(stands)
-            .chain(on_several)
-            .min_by(|a, b| a.total().total_cmp(&b.total()))?;
+        let single = single.into_iter().filter(|with| self.stands(regression, [model, with], last));
+        let best = single.chain(on_several).min_by(|a, b| a.total().total_cmp(&b.total()))?;
         Some(best.terms[last].clone())
     }
 

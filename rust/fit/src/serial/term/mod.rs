@@ -297,7 +297,8 @@ impl Term {
     /// Whether friction with the term still dissipates in both directions at rest, where the joints have the Coulomb friction `coulomb`, N m or N, up to
     /// a tenth of it: friction that drives a joint is a torque.
     pub fn dissipates(&self, coulomb: &[f64]) -> bool {
-        self.members().iter().filter_map(Term::effect).all(|effect| {
+        let rubs = |effect: &EffectInstance| effect.law.spec().hooks.coulomb;
+        self.members().iter().filter_map(Term::effect).filter(rubs).all(|effect| {
             let level = coulomb[effect.joint];
             let at = |direction: f64| JointPoint {
                 t: 0.0,
@@ -308,8 +309,7 @@ impl Term {
                 ..POINT
             };
             let added = |direction: f64| effect.law.coulomb(&effect.p, &at(direction), direction);
-            !effect.law.spec().hooks.coulomb
-                || added(1.0).min(added(-1.0)) >= -(1.0 + UNCERTAIN_FRICTION) * level
+            added(1.0).min(added(-1.0)) >= -(1.0 + UNCERTAIN_FRICTION) * level
         })
     }
 
