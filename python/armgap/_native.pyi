@@ -70,7 +70,7 @@ def simulate_windows(
     tolerance: float = 1e-9,
     smoothing: Sequence[float] = ...,
     substeps: Sequence[int] | None = None,
-    max_substeps: int = 256,
+    max_substeps: int = ...,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], list[int]]: ...
 def inertia(
     kind: str,
