@@ -10,6 +10,7 @@ import pytest
 from armgap import Log
 from armgap.check import Check
 from armgap.diagnosis.equivalents import low_pass, speed_limit, torque_loop
+from armgap.report.pushes import times_of_pushes
 
 
 def test_a_lag_beside_a_low_pass_may_be_the_low_pass() -> None:
@@ -58,6 +59,10 @@ def test_pushes_where_a_drive_is_at_its_strongest_may_be_its_limit() -> None:
         speed_limit(data, [log])
         assert [e["effect"] for e in data["causes"][0]["equivalents"]] == ["torque_speed_limit"] * said
         assert data["causes"][0]["probability"] == pytest.approx(0.45 if said else 0.9)
+    assert "repeat the motion" not in times_of_pushes([pushed(1.0, -0.2)])
     twice = {"causes": [pushed(3.97, -0.2), pushed(4.03, -0.2)]}
     speed_limit(twice, [log])
     assert [c["probability"] for c in twice["causes"]] == pytest.approx([0.225, 0.225])
+    assert times_of_pushes(twice["causes"]).endswith(
+        "Those on joint 1 look like a torque limit that falls with the speed: repeat the motion, and such a limit comes back."
+    )

@@ -41,4 +41,11 @@ def times_of_pushes(pushes: list[dict[str, Any]]) -> str:
         + ", ".join(f"{time(push):.2f} s ({push['probability']:.2f})" for push in group)
         for (joint, log), group in groupby(ordered, key=place)
     ]
-    return f"Pushes: {'; '.join(groups)}; in brackets their probabilities."
+    text = f"Pushes: {'; '.join(groups)}; in brackets their probabilities."
+    alike = {
+        e["joint"] for push in pushes for e in push.get("equivalents") or [] if e["effect"] == "torque_speed_limit"
+    }
+    if alike:
+        joints = " and ".join(f"joint {joint}" for joint in sorted(alike))
+        text += f" Those on {joints} look like a torque limit that falls with the speed: repeat the motion, and such a limit comes back."
+    return text
