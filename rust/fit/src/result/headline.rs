@@ -222,7 +222,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             candidates.extend(lost);
             (model, weights, open) = self.reported(&attribution, &causes, &disturbances, true);
         }
-        // The model search closed the gap with what is not named, too.
+        // Whether a gap is open is the search's answer, whose model may hold effects that are not named.
         let asked = (open || changed) && !causes.is_empty();
         let worse = if asked { self.worse(&attribution, &model, &weights) } else { None };
         if let Some(than) = worse {
