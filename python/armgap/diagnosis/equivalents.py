@@ -23,6 +23,9 @@ _TOLD = 2.0
 #: Shares of a log, by the mean power of the drive and by its mean torque over as long a time, below those in which a push is what a limit that falls
 #: with the speed does. Of 19 such events on three simulated arms all have 0.94 and 0.90 or more; of five pushes on a real arm none has.
 _POWERFUL, _STRONG = 0.94, 0.9
+#: Time with more torque and more speed outside of pushes up to which a push may be a limit, as a part of the push's duration (from 0.25 to 2 all of 39
+#: events of such limits count, on ten simulated arms); and factor on the durations of pushes within which that time does not count.
+_BEYOND, _AROUND = 0.25, 2.0
 #: Time over which velocities are averaged [s].
 _SPEED_S = 0.01
 
@@ -65,12 +68,13 @@ def torque_loop(data: dict[str, Any]) -> None:
 def speed_limit(data: dict[str, Any], logs: Sequence[Log]) -> None:
     """Add a limit of the torque that falls with the speed to the equivalents of pushes that are what such a limit does.
 
-    A push counts if it acts against the command while the drive gives nearly as much power and torque as anywhere in the log. The probability is
-    halved, and halved again for each further such push on the same joint, as pushes come at any time.
+    A push counts if it acts against the command while the drive gives nearly as much power and torque as anywhere in the log, and if the joint hardly
+    ever has more torque and more speed at once without a push: there the limit would act too. The probability is halved, and halved again for each
+    further such push on the same joint, as pushes come at any time.
     """
     by_name = {log.name: log for log in logs}
     pushes = [c for c in data["causes"] if c.get("log") in by_name and c["joint"] is not None]
-    found = [cause for cause in pushes if _is_limit(cause, by_name[cause["log"]])]
+    found = [cause for cause in pushes if _is_limit(cause, pushes, by_name)]
     count = Counter(cause["joint"] for cause in found)
     for cause in found:
         cause["probability"] *= _AS_LIKELY ** count[cause["joint"]]
@@ -81,20 +85,43 @@ def speed_limit(data: dict[str, Any], logs: Sequence[Log]) -> None:
         cause["equivalents"].append(beside("torque_speed_limit", cause["joint"], why, separates=True))
 
 
-def _is_limit(push: dict[str, Any], log: Log) -> bool:
-    time, duration, impulse = (float(push["parameters"][name]["value"]) for name in ("time", "duration", "impulse"))
-    j = push["joint"] - 1
-    during = np.abs(log.t - time) <= 0.5 * duration
+def _is_limit(push: dict[str, Any], pushes: Sequence[dict[str, Any]], logs: dict[str, Log]) -> bool:
+    log, j = logs[push["log"]], push["joint"] - 1
+    during = _during(push, log, 1.0)
     if not during.any():
         return False
-    tau = log.tau[:, j]
-    speed = _mean(np.gradient(log.q[:, j], log.t), round(_SPEED_S / log.sample_period))
-    against = impulse * float(tau[during].mean()) < 0.0
+    tau, speed = log.tau[:, j], _speed(log, j)
+    at_push = float(tau[during].mean()), float(speed[during].mean())
+    against = float(push["parameters"]["impulse"]["value"]) * at_push[0] < 0.0
+    drives = at_push[0] * at_push[1] > 0.0
     samples = int(during.sum())
     ranks = [
         float(np.mean(_mean(x, samples) < x[during].mean())) for x in (tau * speed, np.sign(tau[during].sum()) * tau)
     ]
-    return against and ranks[0] >= _POWERFUL and ranks[1] >= _STRONG
+    if not (against and drives and ranks[0] >= _POWERFUL and ranks[1] >= _STRONG):
+        return False
+    beyond = 0.0
+    for other in logs.values():
+        free = np.ones(len(other), dtype=bool)
+        for known in pushes:
+            if known["joint"] == push["joint"] and known["log"] == other.name:
+                free &= ~_during(known, other, _AROUND)
+        ratio = [x / at for x, at in zip((other.tau[:, j], _speed(other, j)), at_push, strict=True)]
+        # The same direction as at the push, or both the other way round.
+        more = (ratio[0] * ratio[1] > 0.0) & (np.minimum(np.abs(ratio[0]), np.abs(ratio[1])) >= 1.0)
+        beyond += float(np.count_nonzero(more & free)) * other.sample_period
+    return beyond <= _BEYOND * samples * log.sample_period
+
+
+def _during(push: dict[str, Any], log: Log, wide: float) -> NDArray[np.bool_]:
+    """Return a mask of a log's samples within a push, whose duration is multiplied by `wide`."""
+    time, duration = (float(push["parameters"][name]["value"]) for name in ("time", "duration"))
+    return np.abs(log.t - time) <= 0.5 * wide * duration
+
+
+def _speed(log: Log, j: int) -> Array:
+    """Return the velocity of joint `j` (from 0), averaged over `_SPEED_S`."""
+    return _mean(np.gradient(log.q[:, j], log.t), round(_SPEED_S / log.sample_period))
 
 
 def _mean(x: Array, samples: int) -> Array:
