@@ -23,9 +23,9 @@ _TOLD = 2.0
 #: Shares of a log, by the mean power of the drive and by its mean torque over as long a time, below those in which a push is what a limit that falls
 #: with the speed does. Of 19 such events on three simulated arms all have 0.94 and 0.90 or more; of five pushes on a real arm none has.
 _POWERFUL, _STRONG = 0.94, 0.9
-#: Time with more torque and more speed outside of pushes up to which a push may be a limit, as a part of the push's duration (from 0.25 to 2 all of 39
+#: Time with more torque and more speed outside of pushes up to which a push may be a limit, as a part of its duration (from 0.25 to 2 all of 39
 #: events of such limits count, on ten simulated arms); and factor on the durations of pushes within which that time does not count.
-_BEYOND, _AROUND = 0.25, 2.0
+_BEYOND, _NEAR_PUSH = 0.25, 2.0
 #: Time over which velocities are averaged [s].
 _SPEED_S = 0.01
 
@@ -105,7 +105,7 @@ def _is_limit(push: dict[str, Any], pushes: Sequence[dict[str, Any]], logs: dict
         free = np.ones(len(other), dtype=bool)
         for known in pushes:
             if known["joint"] == push["joint"] and known["log"] == other.name:
-                free &= ~_during(known, other, _AROUND)
+                free &= ~_during(known, other, _NEAR_PUSH)
         ratio = [x / at for x, at in zip((other.tau[:, j], _speed(other, j)), at_push, strict=True)]
         # The same direction as at the push, or both the other way round.
         more = (ratio[0] * ratio[1] > 0.0) & (np.minimum(np.abs(ratio[0]), np.abs(ratio[1])) >= 1.0)
