@@ -11,10 +11,10 @@ from typing import Any
 
 from armgap.diagnosis.result import MOST_BYTES, Cause, Diagnosis, Equivalent, RuledOut, Value
 from armgap.errors import OptionError
+from armgap.files.json_result import JsonResult
 from armgap.files.reading import read_bounded
 from armgap.literals import CauseStatus, GapOutcome, Verdict, joint_units
 from armgap.log.findings import counted
-from armgap.options import indentation
 from armgap.remainder import has_gap
 
 __all__ = ["CauseChange", "Comparison", "GapChange", "ParameterChange", "compare", "read_diagnosis"]
@@ -104,7 +104,7 @@ class ParameterChange:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class Comparison(JsonResult):
     """Result of `compare`: changes of gap, causes and parameters between two diagnoses of one arm.
 
     Attributes
@@ -149,21 +149,6 @@ class Comparison:
     def to_dict(self) -> dict[str, Any]:
         """Return the comparison as a JSON object, schema ``armgap.diagnosis.comparison/1``."""
         return {"schema": "armgap.diagnosis.comparison/1", **asdict(self)}
-
-    def to_json(self, indent: int | None = None) -> str:
-        """Return the comparison as JSON, schema ``armgap.diagnosis.comparison/1``.
-
-        Parameters
-        ----------
-        indent : int, optional
-            Blanks per level, 0 to 16; None for one line.
-
-        Raises
-        ------
-        OptionError
-            If `indent` is no such number. A file is written by ``armgap.files.output.write("x.json", comparison.to_json())``.
-        """
-        return json.dumps(self.to_dict(), indent=indentation(indent), allow_nan=False)
 
 
 def read_diagnosis(path: str | Path) -> Diagnosis:

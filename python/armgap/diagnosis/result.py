@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, TypeVar
 
 from armgap.check.check import Check
 from armgap.diagnosis.dependence import Dependence, DependenceGrid, DependenceLaw, dependence
+from armgap.files.json_result import JsonResult
 from armgap.literals import ChainStage, Status, Verdict
 from armgap.log.findings import remarks
-from armgap.options import indentation
 from armgap.report.forms.notebook import NotebookDisplay
 
 __all__ = [
@@ -286,7 +285,7 @@ _Record = TypeVar("_Record", Equivalent, Value, Bound, Sanity)
 
 
 @dataclass(frozen=True)
-class Diagnosis(NotebookDisplay):
+class Diagnosis(JsonResult, NotebookDisplay):
     """Result of `diagnose`: size, location and causes of the gap between an arm's nominal model and its logs.
 
     Attributes
@@ -384,21 +383,6 @@ class Diagnosis(NotebookDisplay):
     def to_dict(self) -> dict[str, Any]:
         """Return the diagnosis as a JSON object, schema ``armgap.diagnosis/1``."""
         return self._data
-
-    def to_json(self, indent: int | None = None) -> str:
-        """Return the diagnosis as JSON, schema ``armgap.diagnosis/1``.
-
-        Parameters
-        ----------
-        indent : int, optional
-            Blanks per level, 0 to 16; None for one line.
-
-        Raises
-        ------
-        OptionError
-            If `indent` is no such number. A file is written by ``armgap.files.output.write("x.json", diagnosis.to_json())``.
-        """
-        return json.dumps(self._data, indent=indentation(indent), allow_nan=False)
 
     @property
     def remarks(self) -> tuple[str, ...]:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,9 +14,9 @@ from armgap.arm.arm import Arm, checked_arm
 from armgap.errors import ColumnError, OptionError
 from armgap.estimation.base_columns import BaseParameters
 from armgap.estimation.estimator import Estimator
+from armgap.files.json_result import JsonResult
 from armgap.literals import FILTERS, SCHEMES, VELOCITIES, Filters, Scheme, VelocityMethod
 from armgap.log.log import Log
-from armgap.options import indentation
 from armgap.progress import report_progress
 
 __all__ = ["SCHEMES", "Identification", "identify", "velocity"]
@@ -29,7 +28,7 @@ DRIFT_SHARE = 0.02
 
 
 @dataclass(frozen=True)
-class Identification:
+class Identification(JsonResult):
     """Result of `identify`: parameters of an arm, estimated from one log by recursive least squares.
 
     Attributes
@@ -60,6 +59,8 @@ class Identification:
     updates, rejected : int
         Samples used, and samples rejected because they were not finite.
     """
+
+    _allows_nan: ClassVar[bool] = True
 
     log: str
     scheme: Scheme
@@ -116,21 +117,6 @@ class Identification:
             "updates": self.updates,
             "rejected": self.rejected,
         }
-
-    def to_json(self, indent: int | None = None) -> str:
-        """Return the identification as JSON, without time series.
-
-        Parameters
-        ----------
-        indent : int, optional
-            Blanks per level, 0 to 16; None for one line.
-
-        Raises
-        ------
-        OptionError
-            If `indent` is no such number. A file is written by ``armgap.files.output.write("x.json", identification.to_json())``.
-        """
-        return json.dumps(self.to_dict(), indent=indentation(indent))
 
 
 def velocity(

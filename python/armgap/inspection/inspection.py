@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import asdict, dataclass, field
 from typing import Any
@@ -12,13 +11,13 @@ from armgap.check.check import Check
 from armgap.check.log_checks.data import data_checks
 from armgap.check.stage import examine
 from armgap.errors import LogShapeError, OptionError
+from armgap.files.json_result import JsonResult
 from armgap.inspection.channels import JointChannels, joint
 from armgap.inspection.excitation import Excitation, excitation
 from armgap.inspection.sampling import Sampling, sampling
 from armgap.log import gather
 from armgap.log.findings import Finding
 from armgap.log.log import Log
-from armgap.options import indentation
 from armgap.progress import report_progress
 
 __all__ = ["Inspection", "inspect"]
@@ -30,7 +29,7 @@ _LEARNT = 0.6
 
 
 @dataclass(frozen=True)
-class Inspection:
+class Inspection(JsonResult):
     """The inspection of one log, the result of `inspect`.
 
     Attributes
@@ -85,21 +84,6 @@ class Inspection:
         found["findings"] = [asdict(f) for f in self.findings]
         plain: dict[str, Any] = _finite(found)
         return plain
-
-    def to_json(self, indent: int | None = None) -> str:
-        """Return the inspection as JSON.
-
-        Parameters
-        ----------
-        indent : int, optional
-            Blanks per level, 0 to 16; None for one line.
-
-        Raises
-        ------
-        OptionError
-            If `indent` is no such number. A file is written by ``armgap.files.output.write("x.json", inspection.to_json())``.
-        """
-        return json.dumps(self.to_dict(), indent=indentation(indent), allow_nan=False)
 
 
 def inspect(log: Any, arm: Arm | None = None, *, repair: bool = True) -> Inspection:

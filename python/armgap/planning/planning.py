@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import os
 from collections.abc import Sequence
@@ -21,6 +20,7 @@ from armgap.diagnosis.nominal import mismatch
 from armgap.diagnosis.result import Diagnosis
 from armgap.errors import OptionError, ResultError
 from armgap.evidence.hypothesis import Hypothesis
+from armgap.files.json_result import JsonResult
 from armgap.files.output import STANDARD_STREAM, write
 from armgap.planning.criterion import PredictedMotion, Setting
 from armgap.planning.dynamics import inverse_dynamics
@@ -109,7 +109,7 @@ class PlannedQuestion:
 
 
 @dataclass(frozen=True)
-class Plan:
+class Plan(JsonResult):
     """A planned experiment, the result of `plan`.
 
     Attributes
@@ -175,10 +175,6 @@ class Plan:
             "evaluations": self.evaluations,
             "notes": list(self.notes),
         }
-
-    def to_json(self, indent: int | None = None) -> str:
-        """Return the plan without its motion as JSON; `indent` and errors are those of `armgap.Diagnosis.to_json`."""
-        return json.dumps(self.to_dict(), indent=options.indentation(indent), allow_nan=False)
 
     def to_polars(self) -> pl.DataFrame:
         """Return the motion as a table with the columns ``t, q_ref1, ..., dq_ref1, ..., tau_ff1, ...``."""

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +13,9 @@ from numpy.typing import NDArray
 from armgap import _native
 from armgap.arm.arm import Arm
 from armgap.estimation.identification import Identification, identify
+from armgap.files.json_result import JsonResult
 from armgap.literals import SCHEMES, Filters, Scheme, VelocityMethod
 from armgap.log.log import Log
-from armgap.options import indentation
 from armgap.simulation import Effect, seed_torque, simulate
 
 __all__ = ["LADDER", "PAPER_ESTIMATES", "PAPER_MEASURED", "Reproduction", "reproduce", "seed_arm", "seed_run"]
@@ -63,7 +62,7 @@ LADDER: tuple[LadderStep, ...] = (
 
 
 @dataclass(frozen=True)
-class Reproduction:
+class Reproduction(JsonResult):
     """Result of `reproduce`: the experiment of Reyes and Kelly (1997) on a simulated arm.
 
     Attributes
@@ -81,6 +80,8 @@ class Reproduction:
     responses : dict
         Open-loop runs of models: ``"Table I"`` with one Coulomb level, and two schemes' estimates identified as in the paper.
     """
+
+    _allows_nan: ClassVar[bool] = True
 
     arm: Arm
     log: Log
@@ -139,21 +140,6 @@ class Reproduction:
             "movement_percent": {s: (100 * self.movement(self.wandering[s])).tolist() for s in SCHEMES},
             "findings": [{"title": title, "text": text} for title, text in self.findings()],
         }
-
-    def to_json(self, indent: int | None = None) -> str:
-        """Return the reproduction of Reyes and Kelly (1997) as JSON: estimates, causes of their deviations from the measured values, findings.
-
-        Parameters
-        ----------
-        indent : int, optional
-            Blanks per level, 0 to 16; None for one line.
-
-        Raises
-        ------
-        OptionError
-            If `indent` is no such number. A file is written by ``armgap.files.output.write("x.json", reproduction.to_json())``.
-        """
-        return json.dumps(self.to_dict(), indent=indentation(indent))
 
 
 def seed_arm() -> Arm:
