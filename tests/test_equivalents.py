@@ -9,7 +9,7 @@ import pytest
 
 from armgap import Log
 from armgap.check import Check
-from armgap.diagnosis.equivalents import low_pass, speed_limit, torque_loop
+from armgap.diagnosis.equivalents import encoder_scale, low_pass, speed_limit, torque_loop
 from armgap.report.pushes import times_of_pushes
 
 
@@ -40,6 +40,26 @@ def test_an_elastic_joint_without_rotor_beside_a_delay_may_be_the_torque_loop() 
     for other in (data(0.001, "link", 1), data(0.02, "motor", 1), data(0.02, "link", 2)):
         torque_loop(other)
         assert other["causes"][1]["equivalents"] == []
+
+
+def test_an_eccentricity_over_a_short_travel_may_be_a_wrong_scale() -> None:
+    t = 0.01 * np.arange(1000)
+
+    def of(travel: float) -> list[str]:
+        q = travel * np.sin(t)[:, None]
+        parameters = {name: {"value": value} for name, value in (("a", 0.03), ("b", 0.01))}
+        cause = {
+            "effect": "encoder_eccentricity",
+            "joint": 1,
+            "probability": 0.8,
+            "equivalents": [],
+            "parameters": parameters,
+        }
+        data: dict[str, Any] = {"causes": [cause]}
+        encoder_scale(data, [Log("run", t, q, 0.0 * q, None)])
+        return [entry["effect"] for entry in data["causes"][0]["equivalents"]]
+
+    assert (of(0.7), of(3.0), of(0.0)) == (["encoder_scale"], [], [])
 
 
 def test_pushes_where_a_drive_is_at_its_strongest_may_be_its_limit() -> None:

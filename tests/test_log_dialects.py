@@ -261,6 +261,16 @@ def test_units_of_counters_are_converted(frame, tmp_path):
         np.testing.assert_allclose(column[:, 0], frame[name].to_numpy(), rtol=1e-12, atol=1e-12)
 
 
+def test_a_unit_of_one_column(frame):
+    degrees = frame.with_columns(pl.col("q2") * DEGREE)
+    log = Log.from_frame(degrees, units={"q2": "deg"})
+    np.testing.assert_allclose(log.q, frame.select("q1", "q2").to_numpy(), rtol=1e-12)
+    with pytest.raises(OptionError, match="`t1` is not a group of columns"):
+        Log.from_frame(frame, units={"t1": "ms"})
+    with pytest.raises(OptionError, match="`q3` is no column of an arm with 1 joint"):
+        Log.from_frame(one_joint(frame), arm=counter(), units={"q3": "deg"})
+
+
 @pytest.mark.parametrize("mapped", [False, True])
 @pytest.mark.parametrize(("names", "column"), [("t,q1,tau1 [A]", "tau1 [A]"), ("t,q1 [gon],tau1", "q1 [gon]")])
 def test_a_unit_that_is_not_known_is_refused_until_it_is_declared(names, column, mapped, frame, tmp_path):

@@ -37,7 +37,7 @@ Side = Literal["motor", "link", "unknown"]
 TauKind = Literal["command", "measured"]
 CauseStatus = Literal["gone", "unseen", "undecided", "new", "smaller", "larger", "unchanged", "renamed"]
 GapOutcome = Literal["smaller", "larger", "unchanged", "none"]
-GravityCorrection = Literal["reversed", "compensated", "standard"]
+GravityCorrection = Literal["reversed", "compensated", "standard", "+x", "-x", "+y", "-y", "+z", "-z"]
 ChainStage = Literal["drive", "transmission", "mechanics", "sensor"]
 
 SERIAL = "serial"

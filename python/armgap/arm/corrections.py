@@ -7,6 +7,7 @@ import math
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
+from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
@@ -79,10 +80,10 @@ class Corrections:
         Factors from torque columns to torques [N m or N]; velocities are not scaled.
     shift : mapping of str to float
         ``{"tau": s}``: seconds to be added to the times of all torques.
-    gravity : {"reversed", "compensated", "standard"}, optional
+    gravity : {"reversed", "compensated", "standard", "+x", "-x", "+y", "-y", "+z", "-z"}, optional
         ``"reversed"``: gravity acts the other way than the arm file says; ``"compensated"``: logged torques lack the part
         that carries the arm's weight, or the arm moves in a horizontal plane; ``"standard"``, for serial arms: 9.81 m/s^2 against the z axis of
-        the base.
+        the base; ``"-y"`` and the like, for serial arms: gravity acts in this direction of the base.
     unit : {"deg", "turns"}, optional
         Unit of all positions; None for rad.
     skip : tuple of str
@@ -130,7 +131,9 @@ class Corrections:
         given = {name: value for name, value in values.items() if value}
         gravity = given.get("gravity")
         if gravity is not None and gravity not in get_args(GravityCorrection):
-            raise OptionError(f"gravity cannot be `{gravity}`", remedy="write reversed, compensated or standard")
+            raise OptionError(
+                f"gravity cannot be `{gravity}`", remedy=f"write {', '.join(get_args(GravityCorrection))}"
+            )
         unit = given.get("unit")
         if unit is not None and unit not in get_args(PositionUnit):
             raise OptionError(f"positions cannot be in `{unit}`", remedy="write deg or turns")
@@ -279,18 +282,23 @@ class Corrections:
         Raises
         ------
         OptionError
-            If standard gravity is asked for an arm whose gravity parameters do not follow from its masses.
+            If standard gravity, or gravity along an axis, is asked for an arm whose gravity parameters do not follow from its masses.
         """
         if self.gravity is None:
             return arm
         if arm.chain is not None:
             by_name = {"reversed": -1.0 * arm.chain.gravity, "compensated": np.zeros(3), "standard": _STANDARD_GRAVITY}
+            size = float(np.linalg.norm(arm.chain.gravity)) or float(np.linalg.norm(_STANDARD_GRAVITY))
+            by_name |= {
+                f"{sign}{axis}": float(f"{sign}1") * size * np.eye(3)["xyz".index(axis)]
+                for sign, axis in product("+-", "xyz")
+            }
             gravity = by_name[self.gravity]
             chain = replace(arm.chain, gravity=gravity)
             return replace(arm, chain=chain, gravity=float(np.linalg.norm(gravity)))
-        if self.gravity == "standard":
+        if self.gravity not in ("reversed", "compensated"):
             raise OptionError(
-                f"gravity cannot be `standard` for an arm of kind `{arm.kind}`, whose parameters hold it",
+                f"gravity cannot be `{self.gravity}` for an arm of kind `{arm.kind}`, whose parameters hold it",
                 remedy="give its gravity parameters in the arm file",
             )
         theta, sigma = arm.theta.copy(), arm.sigma.copy()

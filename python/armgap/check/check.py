@@ -14,6 +14,7 @@ CheckName = Literal[
     "relative_angle",
     "position_zero",
     "gravity_sign",
+    "gravity_direction",
     "gravity_missing",
     "torque_is_position",
     "torque_unit",
@@ -27,6 +28,7 @@ CheckName = Literal[
     "stamp_jitter",
     "dead_stretch",
     "copied_holdout",
+    "logs_differ",
 ]
 Severity = Literal["error", "repaired", "warning"]
 

@@ -98,7 +98,7 @@ def corrections_options(command: Callable[..., Any]) -> Callable[..., Any]:
     command = click.option(
         "--gravity",
         type=gravity,
-        help="Gravity acts the other way, torques carry no weight, or the arm file of a serial arm leaves out gravity.",
+        help="Gravity acts the other way or along an axis of the base, torques carry no weight, or the arm file of a serial arm leaves out gravity.",
     )(command)
     for name, (metavar, text) in reversed(_CORRECTIONS.items()):
         command = click.option(f"--{name}", multiple=True, type=Words(), metavar=metavar, help=text)(command)

@@ -17,11 +17,12 @@ from armgap.arm.corrections import Corrections
 from armgap.check import torque_unit
 from armgap.check.check import Check
 from armgap.check.contradiction import start_beside_file
+from armgap.check.serial.logs_differ import logs_differ
 from armgap.check.stage import unexplained_columns
 from armgap.check.time_shift import causal, early, explains_better, taken_back
 from armgap.diagnosis.custom_effect import CustomEffect, TorqueTables, check_effects
 from armgap.diagnosis.drive_chain import drive_chain
-from armgap.diagnosis.equivalents import beside, low_pass, speed_limit, torque_loop
+from armgap.diagnosis.equivalents import beside, encoder_scale, low_pass, speed_limit, torque_loop
 from armgap.diagnosis.prepared_input import PreparedInput, prepare, refused
 from armgap.diagnosis.result import Diagnosis
 from armgap.diagnosis.serial_settings import serial_settings
@@ -155,7 +156,9 @@ def _diagnose(given: PreparedInput, settings: dict[str, Any], effects: Sequence[
         return _diagnose(replace(given.with_factors(factors), factors={}), settings, effects)
     if taken_back(data["causes"], arm.n_joints, given.shift):
         return _diagnose(given.without_shift(), settings, effects)
-    if given.shift < 0.0 and not contradictory and data["verdict"] == "unexplained":
+    # On a serial arm the equation of motion alone has found the shift: predictions confirm it.
+    open_verdicts = ("unexplained",) if arm.chain is None else ("unexplained", "effect")
+    if given.shift < 0.0 and not contradictory and data["verdict"] in open_verdicts:
         unshifted = given.without_shift()
         other = _attributed(unshifted, settings, TorqueTables.of(effects, unshifted.training, unshifted.holdout))
         if explains_better(other["gap"], data["gap"]):
@@ -171,8 +174,11 @@ def _diagnose(given: PreparedInput, settings: dict[str, Any], effects: Sequence[
             cause["log"] = _WHOLE.sub("", cause["log"])
     data["notes"] = [*given.notes, *data["notes"]]
     checks = [*given.checks, *(_ambiguous_delay(data, training, arm) or _hidden_delay(data, given))]
+    if arm.chain is not None and data["verdict"] == "unexplained":
+        checks += logs_differ([*training, *held], arm)
     low_pass(data, given.checks)
     torque_loop(data)
+    encoder_scale(data, (*training, *held))
     data["checks"] = [check.to_dict() for check in checks]
     known, corrected_logs = tables.applied(data, (*training, *held))
     count = len(training)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from armgap.check.check import Check
 from armgap.log.log import Log
 
-__all__ = ["beside", "low_pass", "speed_limit", "torque_loop"]
+__all__ = ["beside", "encoder_scale", "low_pass", "speed_limit", "torque_loop"]
 
 Array = NDArray[np.float64]
 
@@ -26,6 +26,8 @@ _POWERFUL, _STRONG = 0.94, 0.9
 #: Time with more torque and more speed outside of pushes up to which a push may be a limit, as a part of its duration (from 0.25 to 2 all of 39
 #: events of such limits count, on ten simulated arms); and factor on the durations of pushes within which that time does not count.
 _BEYOND, _NEAR_PUSH = 0.25, 2.0
+#: Share of the variance of an encoder's error along the logs that a straight line over the position has to explain for a wrong scale to do the same.
+_STRAIGHT = 0.95
 #: Time over which velocities are averaged [s].
 _SPEED_S = 0.01
 
@@ -63,6 +65,24 @@ def torque_loop(data: dict[str, Any]) -> None:
             cause["probability"] *= _AS_LIKELY
             why = "with the delay or lag beside it: the rotor's inertia is not told from none, and a torque loop of second order does the same"
             cause["equivalents"].append(beside("torque_loop_resonance", cause["joint"], why))
+
+
+def encoder_scale(data: dict[str, Any], logs: Sequence[Log]) -> None:
+    """Add a wrong scale of the positions to the equivalents of an encoder's eccentricity that is nearly straight over the joint's travel.
+
+    A wrong gear ratio, or a wrong number of counts per turn, gives an error in proportion to the position, as a sine does over less than a turn.
+    """
+    for cause in data["causes"]:
+        if cause["effect"] != "encoder_eccentricity" or cause["joint"] is None:
+            continue
+        q = np.concatenate([log.q[:, cause["joint"] - 1] for log in logs])
+        a, b = (float(cause["parameters"][name]["value"]) for name in ("a", "b"))
+        error = a * np.sin(q) + b * np.cos(q)
+        if np.ptp(q) == 0.0 or error.std() == 0.0:
+            continue
+        if np.corrcoef(q, error)[0, 1] ** 2 > _STRAIGHT:
+            why = "over this travel the error is nearly in proportion to the position, as with a wrong gear ratio or counts per turn"
+            cause["equivalents"].append(beside("encoder_scale", cause["joint"], why, separates=True))
 
 
 def speed_limit(data: dict[str, Any], logs: Sequence[Log]) -> None:

@@ -15,6 +15,7 @@ from armgap.check.check import Check
 from armgap.check.log_checks.data import copied_holdout, data_checks
 from armgap.check.serial.contradictions import contradictions
 from armgap.check.serial.dead_stretch import find as dead_stretches
+from armgap.check.serial.late_torques import late_torques
 from armgap.check.stage import examine
 from armgap.diagnosis.provenance import provenance
 from armgap.errors import LogShapeError, OptionError
@@ -136,12 +137,15 @@ def _examined(given: PreparedInput, horizon: float, *, repair: bool) -> Prepared
         corrections, found_in_all = dead_stretches([*training, *held], given.arm)
         if not found_in_all:
             corrections, found_in_all = contradictions([*training, *held], given.arm, repair=repair)
+        if not found_in_all:
+            corrections, found_in_all = late_torques([*training, *held], given.arm, repair=repair)
         return replace(
             given,
             training=[corrections.on_log(log) for log in training],
             holdout=[corrections.on_log(log) for log in held],
             arm=corrections.on_arm(given.arm),
             checks=(*found_in_all, *given.checks),
+            shift=corrections.shift.get("tau", 0.0),
         )
     try:
         found = examine(training, held, given.arm, horizon=horizon, repair=repair)

@@ -15,6 +15,7 @@ from armgap.arm.arm import Arm
 from armgap.arm.corrections import Corrections
 from armgap.check.check import Check
 from armgap.check.readings import (
+    gravity_direction,
     gravity_missing,
     gravity_sign,
     joint_order,
@@ -25,7 +26,7 @@ from armgap.check.readings import (
     torque_sign,
 )
 from armgap.check.readings.reading import Reading
-from armgap.check.serial.weak_form import Fit, Rows, fit
+from armgap.check.serial.weak_form import Fit, Rows, fit, rows_of
 from armgap.log.log import Log
 
 __all__ = ["contradictions"]
@@ -44,10 +45,15 @@ _RESTORED = 36.0
 # `_EXPLAINS` of every joint's mean square torque stays unexplained, or half of the share with the log as it stands.
 _MIN_COST_DECREASE = 1.0
 _EXPLAINS = 0.15
-# Factor on the standard deviations of the last link's inertial parameters for an unknown load: its largest mass in masses of the last link.
-_LOADED = 30.0
+# Standard deviations of an unknown load on the last link: its mass in masses of the whole arm, as cobots carry a third to a half of what they weigh,
+# and its distance from the last joint [m].
+_LOAD_MASS, _LOAD_DISTANCE = 0.5, 0.3
 # Increase of the cost up to which a torque's factor is set to 1: friction alone determines no factor.
 _UNDECIDED = 10.0
+# Ratio of the factor by small torques to that by all, up or down, from which a factor is no unit: a limit of the drive takes large torques alone.
+_NOT_CONSTANT = 1.5
+# Torques that are small: up to this part of a joint's large torque, which is a quantile of all.
+_SMALL, _LARGE_QUANTILE = 0.5, 0.95
 # Difference of two readings' costs, as a part of their gain, below which the readings are alike.
 _ALIKE_COST_PART = 0.02
 
@@ -66,6 +72,7 @@ _READINGS: tuple[Callable[[Arm, float], Iterable[Reading]], ...] = (
     position_zero.readings,
     relative_angle.readings,
     gravity_sign.readings,
+    gravity_direction.readings,
     gravity_missing.readings,
     position_unit.readings,
 )
@@ -125,8 +132,11 @@ def _is_suspicious(stands: Fit, arm: Arm) -> bool:
 
 def _with_load(arm: Arm) -> Arm:
     """Return the arm with large standard deviations of the last link's ten inertial parameters, as for an unknown load."""
+    mass = _LOAD_MASS * float(arm.theta[: 10 * arm.n_joints : 10].sum())
+    load = mass * np.array([1.0, *[_LOAD_DISTANCE] * 3, *[_LOAD_DISTANCE**2] * 6])
     sigma = arm.sigma.copy()
-    sigma[10 * (arm.n_joints - 1) : 10 * arm.n_joints] *= _LOADED
+    last = slice(10 * (arm.n_joints - 1), 10 * arm.n_joints)
+    sigma[last] = np.hypot(sigma[last], load)
     return replace(arm, sigma=sigma)
 
 
@@ -229,9 +239,25 @@ def _factors(logs: Sequence[Log], arm: Arm) -> tuple[Array, Fit] | None:
     )
     for j in range(arm.n_joints):
         plain = _with_factor(rows, arm, factors, j, float(np.sign(factors[j])))
-        if plain[1].cost < best.cost + _UNDECIDED:
+        if plain[1].cost < best.cost + _UNDECIDED or not _is_constant(logs, arm, factors, j):
             factors, best = plain
     return factors, best
+
+
+def _is_constant(logs: Sequence[Log], arm: Arm, factors: Array, j: int) -> bool:
+    """Whether joint `j`'s (from 0) small torques do not contradict its factor, as they do where the drive limits large ones."""
+    found = [rows for _, rows in rows_of(logs, arm)]
+    small = _SMALL * float(np.quantile(np.concatenate([np.abs(rows.y[:, j]) for rows in found]), _LARGE_QUANTILE))
+    used = [np.ones(rows.y.shape, dtype=bool) for rows in found]
+    for mask, rows in zip(used, found, strict=True):
+        mask[:, j] = np.abs(rows.y[:, j]) <= small
+    half = Rows.of_rows(found, used)
+    if half is None:
+        return True
+    all_of_them = half.fit(arm, factors).cost
+    tried, best = _descended_on(half, arm, factors, j)
+    ratio = tried[j] / factors[j]
+    return bool(1.0 / _NOT_CONSTANT < ratio < _NOT_CONSTANT or all_of_them - best.cost < _UNDECIDED)
 
 
 def _descended(rows: Rows, arm: Arm, factors: Array, grids: Iterable[Array]) -> tuple[Array, Fit]:
@@ -242,6 +268,12 @@ def _descended(rows: Rows, arm: Arm, factors: Array, grids: Iterable[Array]) -> 
             tried = (_with_factor(rows, arm, factors, j, factor) for factor in factors[j] * grid)
             factors, best = min(((factors, best), *tried), key=lambda found: found[1].cost)
     return factors, best
+
+
+def _descended_on(rows: Rows, arm: Arm, factors: Array, j: int) -> tuple[Array, Fit]:
+    """Return the factors of least cost with that of joint `j` (from 0) changed alone, and their fit."""
+    tried = (_with_factor(rows, arm, factors, j, factor) for factor in factors[j] * _COARSE[_COARSE > 0.0])
+    return min(tried, key=lambda found: found[1].cost)
 
 
 def _with_factor(rows: Rows, arm: Arm, factors: Array, j: int, factor: float) -> tuple[Array, Fit]:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from armgap.arm.arm import Arm
 from armgap.log.log import Log
 
-__all__ = ["Fit", "LogRows", "Rows", "fit"]
+__all__ = ["Fit", "LogRows", "Rows", "fit", "rows_of", "taps_of", "torques_averaged"]
 
 Array = NDArray[np.float64]
 
@@ -79,7 +79,7 @@ class LogRows:
         """Return the rows of samples `begin` up to `end`, without `end`; None where these are too few for a test function."""
         assert arm.chain is not None
         period = float(np.median(np.diff(log.t)))
-        taps = max(round(_HALF_WIDTH_S / period), _FEWEST_PERIODS)
+        taps = taps_of(log)
         count = end - begin - 1
         if count < 4 * taps:
             return None
@@ -91,11 +91,9 @@ class LogRows:
         dq = _smoothed(mean_dq, taps // 2)
         n = q.shape[1]
         edge = np.arange(2 * taps + 1) / taps - 1.0
-        area = 0.5 * (edge + np.sin(np.pi * edge) / np.pi)
-        weight = np.diff(area)
+        weight = np.diff(_area(taps))
         rise = np.diff(0.5 * (1.0 + np.cos(np.pi * edge))) / (taps * period)
         starts = np.arange(0, count - 2 * taps, max(taps // 2, 1))
-        index = starts[:, None] + np.arange(2 * taps)[None, :]
         momentum = np.zeros((count, n, 13 * n))
         rest = np.zeros_like(momentum)
         q, mean_dq, dq = (np.ascontiguousarray(x) for x in (q, mean_dq, dq))
@@ -105,13 +103,16 @@ class LogRows:
         momentum[:, joints, 10 * n + joints] = mean_dq
         rest[:, joints, 11 * n + joints] = dq
         rest[:, joints, 12 * n + joints] = np.sign(dq)
-        tau = _torques(log, arm)[:-1][part]
-        torque = np.einsum("k,wkj->wj", weight, tau[index])
+        torque = torques_averaged(_torques(log, arm), begin + starts, taps)
         psi = np.zeros((len(starts), n, 13 * n))
         for k in range(2 * taps):
             at = starts + k
             psi += weight[k] * rest[at] - rise[k] * momentum[at]
         return cls(torque, psi, begin + starts, begin + starts + 2 * taps)
+
+    def at(self, mask: NDArray[np.bool_]) -> LogRows:
+        """Return the rows that are marked in `mask`, shape (n_rows,)."""
+        return LogRows(self.y[mask], self.psi[mask], self.first[mask], self.last[mask])
 
 
 @dataclass(frozen=True)
@@ -136,8 +137,7 @@ class Rows:
     @classmethod
     def of(cls, logs: Sequence[Log], arm: Arm) -> Rows | None:
         """Return the normal equations of given logs; None where the logs hold too few samples, or no joint has a torque."""
-        most = MOST_INTERVALS // len(logs)
-        found = [rows for log in logs if (rows := LogRows.of(log, arm, *_middle(log, most))) is not None]
+        found = [rows for _, rows in rows_of(logs, arm)]
         return cls.of_rows(found, [np.ones(rows.y.shape, dtype=bool) for rows in found])
 
     @classmethod
@@ -188,6 +188,30 @@ def fit(logs: Sequence[Log], arm: Arm) -> Fit | None:
     """Estimate the arm's parameters from the torques of logs; None where the logs hold too few samples."""
     rows = Rows.of(logs, arm)
     return None if rows is None else rows.fit(arm, np.ones(arm.n_joints))
+
+
+def rows_of(logs: Sequence[Log], arm: Arm) -> list[tuple[Log, LogRows]]:
+    """Return the logs that are long enough for a row, each with the rows of its middle; `MOST_INTERVALS` in all logs together."""
+    most = MOST_INTERVALS // len(logs)
+    return [(log, rows) for log in logs if (rows := LogRows.of(log, arm, *_middle(log, most))) is not None]
+
+
+def taps_of(log: Log) -> int:
+    """Return half the number of sample intervals under a test function of a log."""
+    period = float(np.median(np.diff(log.t)))
+    return max(round(_HALF_WIDTH_S / period), _FEWEST_PERIODS)
+
+
+def torques_averaged(tau: Array, first: NDArray[np.int64], taps: int) -> Array:
+    """Return a log's torques, shape (n_samples, n_joints), averaged under the test functions that begin at the samples `first`."""
+    index = first[:, None] + np.arange(2 * taps)[None, :]
+    return np.asarray(np.einsum("k,wkj->wj", np.diff(_area(taps)), tau[index]))
+
+
+def _area(taps: int) -> Array:
+    """Return the integral of a raised cosine from its begin to every sample."""
+    edge = np.arange(2 * taps + 1) / taps - 1.0
+    return np.asarray(0.5 * (edge + np.sin(np.pi * edge) / np.pi))
 
 
 def _middle(log: Log, most: int) -> tuple[int, int]:

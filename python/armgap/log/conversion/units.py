@@ -88,7 +88,7 @@ class Scales:
 
 
 def stated(names: Names, declared: Mapping[str, str], arm: Arm | None, place: Path | str) -> Scales:
-    """Return the factors to SI that the user declares (`declared`, by group), or that the file states, by column.
+    """Return the factors to SI that the user declares (`declared`, by group or by column such as `q3`), or that the file states, by column.
 
     Raises
     ------
@@ -103,25 +103,30 @@ def stated(names: Names, declared: Mapping[str, str], arm: Arm | None, place: Pa
     _check_second_encoders(names, declared, place)
     groups = {"t": (names.t,), "q": names.q, "tau": names.tau, "dq": names.dq or ()}
     for key, column in names.pairs:
-        if column in names.foreign_units and group_of(key) not in declared and not has_factor(key, arm):
+        is_declared = group_of(key) in declared or key in declared
+        if column in names.foreign_units and not is_declared and not has_factor(key, arm):
             raise unknown_unit(column, names.foreign_units[column], key, place, mapped=True)
     findings: list[Finding] = []
-    settled = set(declared)
+    settled = {_group_declared(key) for key in declared}
 
-    def of(group: str, columns: tuple[str, ...]) -> NDArray[np.float64]:
-        unit = declared.get(group)
+    def factor(group: str, columns: tuple[str, ...], j: int) -> tuple[float, str | None]:
+        """Return the factor to SI of the column of joint `j` (from 0), and the unit if the file states it."""
+        unit = declared.get(f"{group}{j + 1}", declared.get(group))
         counted = unit is not None and unit == COUNTED.get(group)
         if unit is not None and not (counted and columns is names.q_link):
             # In an arm with rotary and linear joints a unit of angles does not change lengths.
-            suits = [_suits(group, unit, arm, j) for j in range(len(columns))]
-            return np.array(
-                [_factor(group, unit, arm, place, c, j) if suits[j] else 1.0 for j, c in enumerate(columns)]
-            )
-        factors = [_by_file(group, column, names.units.get(column), arm, place, j) for j, column in enumerate(columns)]
-        units = {unit for column in columns if (unit := names.units.get(column)) is not None}
+            suits = _suits(group, unit, arm, j)
+            return (_factor(group, unit, arm, place, columns[j], j) if suits else 1.0), None
+        by_file = names.units.get(columns[j])
+        return _by_file(group, columns[j], by_file, arm, place, j), by_file
+
+    def of(group: str, columns: tuple[str, ...]) -> NDArray[np.float64]:
+        found = [factor(group, columns, j) for j in range(len(columns))]
+        factors = [number for number, _ in found]
+        units = {unit for _, unit in found if unit is not None}
         if columns and columns is groups[group] and all(column in names.units for column in columns):
             settled.add(group)
-        if any(factor != 1.0 for factor in factors):
+        if any(number != 1.0 and unit is not None for number, unit in found):
             findings.append(
                 Finding("units", f"{WORDS[group]} are in {', '.join(sorted(units))}, as the file says; converted")
             )
@@ -224,12 +229,26 @@ def _check_second_encoders(names: Names, declared: Mapping[str, str], place: Pat
             )
 
 
-def _check_declared(group: str, unit: str, arm: Arm | None) -> None:
-    if group not in FACTORS:
-        raise OptionError(f"`{group}` is not a group of columns", remedy=f"declare units of {', '.join(FACTORS)}")
+def _group_declared(key: str) -> str:
+    """Return the group of columns of which a unit is declared: ``q`` for ``q`` and for ``q3``."""
+    return key.rstrip("0123456789")
+
+
+def _check_declared(key: str, unit: str, arm: Arm | None) -> None:
+    group, joint = _group_declared(key), key[len(_group_declared(key)) :]
+    if group not in FACTORS or (joint and group == "t"):
+        raise OptionError(
+            f"`{key}` is not a group of columns, nor a column",
+            remedy=f"declare units of {', '.join(FACTORS)}, or of one column such as q3",
+        )
+    if joint and arm is not None and not 1 <= int(joint) <= arm.n_joints:
+        raise OptionError(
+            f"`{key}` is no column of an arm with {arm.n_joints} joints", remedy="declare units of its columns"
+        )
     if unit not in _known(group):
         raise OptionError(f"`{unit}` is not a unit of {group}", remedy=f"known: {', '.join(_known(group))}")
-    if arm is not None and not any(_suits(group, unit, arm, j) for j in range(arm.n_joints)):
+    judged = [int(joint) - 1] if joint else range(arm.n_joints if arm is not None else 0)
+    if arm is not None and not any(_suits(group, unit, arm, j) for j in judged):
         motion = "turns" if arm.rotary else "slides"
         raise OptionError(f"{group} in {unit} does not suit an arm that {motion}", remedy="declare another unit")
 
@@ -434,7 +453,7 @@ def _position(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None) 
             why += ", in steps of one encoder count in degrees" if counts else ""
             raise UnitError(
                 why,
-                remedy=f"it looks like {unit}: add --units q={unit}, or q={si} if it is right",
+                remedy=f"it looks like {unit}: add --units q={unit}, q{j + 1}={unit} if the other joints are in {si}, or q={si} if it is right",
                 file=place,
                 column=name,
             )

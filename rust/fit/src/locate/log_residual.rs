@@ -60,6 +60,11 @@ impl<const N: usize> LogResidual<N> {
         (0..len).map(|k| self.cause_at(k.saturating_sub(first).min(last))).collect()
     }
 
+    /// Torque of the cause on `joint` (from 0) at a sample, N m or N.
+    pub fn cause_of(&self, joint: usize, sample: usize) -> f64 {
+        self.cause_at(sample)[joint]
+    }
+
     fn cause_at(&self, sample: usize) -> SVector<f64, N> {
         self.cause.get(sample).copied().unwrap_or_else(SVector::zeros)
     }

@@ -4,8 +4,10 @@ use crate::disturbance::intensity::shares;
 use crate::disturbance::push::Disturbance;
 use crate::likelihood::context::{DiagnosisContext, WindowSet};
 use crate::likelihood::encoder_zero::EncoderZeros;
+use crate::likelihood::holdout::CONSEQUENTIAL_ERROR;
 use crate::likelihood::solve::Fit;
 use crate::likelihood::weighting::Weighting;
+use crate::locate::dependence::Dependence;
 use crate::locate::energy::energy;
 use crate::locate::regimes::{ResidualTorques, places, regimes};
 use crate::log::input::Options;
@@ -69,7 +71,8 @@ pub fn assemble<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         || (ruled_out(context, attribution, hidden, rotary), ranking(context, attribution, rotary));
     let ((absent, ranking), ((mut gap, beside_zeros, series, free_run_series), (residuals, regimes))) =
         rayon::join(candidates, || rayon::join(figures, residual));
-    gap.training = in_training.filter(|_| !stands_out(&beside_zeros, &gap.floor, &gap.motion));
+    gap.training =
+        in_training.filter(|_| !stands_out(&beside_zeros, &gap.floor, &gap.motion, CONSEQUENTIAL_ERROR));
     let evidence = Evidence {
         named: !headline.causes.is_empty() || !disturbances.is_empty(),
         open: headline.open,
@@ -79,10 +82,12 @@ pub fn assemble<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         after: &beside_zeros,
         floor: &gap.floor,
         motion: &gap.motion,
+        consequence: CONSEQUENTIAL_ERROR,
     };
     let (verdict, remains) = (evidence.verdict(), evidence.remains());
-    let laws =
+    let besides =
         if remains { context.laws_beside(&headline.model, &headline.weights, rotary) } else { Vec::new() };
+    let laws: Vec<Dependence> = besides.into_iter().map(|beside| beside.law).collect();
     let sanity = sanity(description.kind, &estimates(&headline.model, description), remains);
     let mut notes = notes(headline, options.max_causes, remains, &sanity, &gap, description);
     notes.extend(left_out(context));

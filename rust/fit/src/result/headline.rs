@@ -12,6 +12,7 @@ use crate::model::hypothesis::{EffectInstance, Hypothesis};
 use crate::numeric::products::rms;
 use crate::predict::window::Dataset;
 use crate::search::belief::Cause;
+use crate::search::evidence::Weighed;
 use crate::search::model_search::{Attribution, refresh};
 use armgap_core::arm::Arm;
 use armgap_core::effect::{NEVER, Trial};
@@ -186,6 +187,18 @@ fn withhold(causes: &mut Vec<Cause>, candidates: &mut Vec<Unnamed<Cause>>, than:
     candidates.splice(0..0, withheld);
 }
 
+/// Fitted model with the causes and disturbances to be named.
+struct Reported<const N: usize, const P: usize> {
+    /// The model, fitted to the training logs.
+    model: Fit<P>,
+    /// Its weights of windows.
+    weights: SplitWeighting<N>,
+    /// Whether it leaves a gap open.
+    open: bool,
+    /// The model, fitted to the holdout.
+    on_holdout: Fit<P>,
+}
+
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
     /// Names at most `most` causes of a search's `conclusion`, and its external disturbances, and fits the model with them.
     ///
@@ -210,24 +223,30 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         }
         self.set_pushes(&disturbances);
         changed |= !candidates.is_empty();
-        let (mut model, mut weights, mut open) = self.reported(&attribution, &causes, &disturbances, changed);
-        // Without those that are not named, the others may have no size any more.
+        let Reported { mut model, mut weights, mut open, mut on_holdout } =
+            self.reported(&attribution, &causes, &disturbances, changed);
+        // Without those that are not named, the others may have no size any more, or leave what is no longer explained beside them.
         while changed && !causes.is_empty() {
             refresh(&model, &mut causes);
+            if let Some(last) = attribution.nodes.last() {
+                let weighed = Weighed { last, model: &model, on_holdout: &on_holdout, without: &[] };
+                self.weigh_in(&weighed, &mut causes);
+            }
             let (named, lost) = sorted(causes, most, |cause| unfit_in(&model, cause));
             causes = named;
             if lost.is_empty() {
                 break;
             }
             candidates.extend(lost);
-            (model, weights, open) = self.reported(&attribution, &causes, &disturbances, true);
+            Reported { model, weights, open, on_holdout } =
+                self.reported(&attribution, &causes, &disturbances, true);
         }
         // Whether a gap is open is the search's answer, whose model may hold effects that are not named.
         let asked = (open || changed) && !causes.is_empty();
         let worse = if asked { self.worse(&attribution, &model, &weights) } else { None };
         if let Some(than) = worse {
             withhold(&mut causes, &mut candidates, than);
-            (model, weights, open) = self.reported(&attribution, &causes, &disturbances, true);
+            Reported { model, weights, open, .. } = self.reported(&attribution, &causes, &disturbances, true);
         }
         refresh(&model, &mut causes);
         let (bias, refit) = rayon::join(
@@ -287,19 +306,20 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         is_worse(&found, &given).then_some("with the re-estimated parameters alone")
     }
 
-    /// Fitted model with the named causes and disturbances alone, its window weights, and whether it leaves a gap open; that of the model search where
-    /// all that was found is named, else (`changed`) fitted again.
+    /// Fitted model with the named causes and disturbances alone; that of the model search where all that was found is named, else (`changed`) fitted
+    /// again.
     fn reported(
         &self,
         attribution: &Attribution<N, P>,
         causes: &[Cause],
         disturbances: &[Disturbance],
         changed: bool,
-    ) -> (Fit<P>, SplitWeighting<N>, bool) {
+    ) -> Reported<N, P> {
         let last = &attribution.nodes[attribution.nodes.len() - 1];
         let open = attribution.is_unexplained();
         if !changed {
-            return (attribution.model.clone(), last.weights.clone(), open);
+            let [model, on_holdout] = [&attribution.model, &attribution.on_holdout].map(Clone::clone);
+            return Reported { model, weights: last.weights.clone(), open, on_holdout };
         }
         // The last search node without effects: the arm with parameters re-estimated, and the friction regularisation that was fitted without effects.
         let bare = |i: &usize| attribution.nodes[*i].settled.hypothesis.effects.is_empty();
@@ -313,8 +333,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             let (model, weights) = self.settle(&hypothesis, last.weights.training.scale);
             (model, weights, open)
         };
-        self.apply_dispersion_factor(&mut model, &weights);
-        (model, weights, open)
+        let on_holdout = self.apply_dispersion_factor(&mut model, &weights);
+        Reported { model, weights, open, on_holdout }
     }
 }
 

@@ -5,6 +5,7 @@
 
 use crate::likelihood::context::{DiagnosisContext, WindowSet};
 use crate::likelihood::encoder_zero::EncoderZeros;
+use crate::likelihood::holdout::CONSEQUENTIAL_ERROR;
 use crate::model::hypothesis::Hypothesis;
 use crate::numeric::products::rms;
 use crate::result::floor::floor;
@@ -26,7 +27,7 @@ pub fn training_gap<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     let floor = floor(context, data, model, &plain, seed).map(f64::sqrt).to_vec();
     let after = rms::<N>(measured, &data.predict(&context.arm, model, &zeros.offsets(data)));
     let motion = rms::<N>(measured, &sample.still());
-    stands_out(&after, &floor, &motion).then_some(TrainingErrors { after, floor })
+    stands_out(&after, &floor, &motion, CONSEQUENTIAL_ERROR).then_some(TrainingErrors { after, floor })
 }
 
 /// Remark on a gap of the training logs; `rotary` is whether each joint is rotary.

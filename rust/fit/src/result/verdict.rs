@@ -1,6 +1,5 @@
 //! The verdict of a diagnosis, as a function of the prediction errors and of whether a cause is named.
 
-use crate::likelihood::holdout::CONSEQUENTIAL_ERROR;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -48,6 +47,8 @@ pub struct Evidence<'a> {
     pub floor: &'a [f64],
     /// RMS displacement of the arm over the horizon by joint, rad or m.
     pub motion: &'a [f64],
+    /// Error, as a part of the displacement, below which a gap is of no consequence.
+    pub consequence: f64,
 }
 
 impl Evidence<'_> {
@@ -57,7 +58,7 @@ impl Evidence<'_> {
     }
 
     fn stands_out(&self, error: &[f64]) -> bool {
-        stands_out(error, self.floor, self.motion)
+        stands_out(error, self.floor, self.motion, self.consequence)
     }
 
     /// Verdict that follows from the errors and from whether a cause is named.
@@ -82,18 +83,16 @@ pub(crate) fn is_improved(before: &[f64], after: &[f64], floor: &[f64]) -> bool 
         .any(|((before, after), floor)| before - after > IMPROVEMENT * before && *before > IMPROVABLE * floor)
 }
 
-/// Whether the `error` of some joint is several noise floors and of consequence in relation to the joint's motion; all in rad or m, by joint.
-pub(crate) fn stands_out(error: &[f64], floor: &[f64], motion: &[f64]) -> bool {
+/// Whether the `error` of some joint is several noise floors and larger than the part `consequence` of the joint's motion; all in rad or m, by joint.
+pub(crate) fn stands_out(error: &[f64], floor: &[f64], motion: &[f64], consequence: f64) -> bool {
     let limits = floor.iter().zip(motion);
-    error
-        .iter()
-        .zip(limits)
-        .any(|(e, (floor, motion))| *e > ABOVE_NOISE * floor && *e > CONSEQUENTIAL_ERROR * motion)
+    error.iter().zip(limits).any(|(e, (floor, motion))| *e > ABOVE_NOISE * floor && *e > consequence * motion)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::likelihood::holdout::CONSEQUENTIAL_ERROR;
 
     const FLOOR: f64 = 1e-3;
 
@@ -103,8 +102,18 @@ mod tests {
         let [before, refit, after] = errors.map(|e| [0.1 * FLOOR, e * FLOOR]);
         let (floor, motion) = ([FLOOR; 2], [1.0, motion * FLOOR]);
         let (before, refit, after) = (&before, &refit, &after);
-        Evidence { named, open, in_training: false, before, refit, after, floor: &floor, motion: &motion }
-            .verdict()
+        Evidence {
+            named,
+            open,
+            in_training: false,
+            before,
+            refit,
+            after,
+            floor: &floor,
+            motion: &motion,
+            consequence: CONSEQUENTIAL_ERROR,
+        }
+        .verdict()
     }
 
     #[test]
@@ -119,6 +128,7 @@ mod tests {
             after: &quiet,
             floor: &quiet,
             motion: &[1.0],
+            consequence: CONSEQUENTIAL_ERROR,
         };
         assert_eq!(evidence(false, false).verdict(), Verdict::None);
         assert_eq!(evidence(true, false).verdict(), Verdict::Unexplained);
@@ -179,6 +189,7 @@ mod tests {
                 after: &after,
                 floor: &floor,
                 motion: &motion,
+                consequence: CONSEQUENTIAL_ERROR,
             }
             .verdict()
         };
@@ -210,6 +221,7 @@ mod tests {
                         after: &errors,
                         floor: &floor,
                         motion: &motion,
+                        consequence: CONSEQUENTIAL_ERROR,
                     };
                     assert_eq!(evidence.remains(), evidence.verdict() == Verdict::Unexplained);
                 }

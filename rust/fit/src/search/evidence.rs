@@ -12,9 +12,10 @@ use crate::likelihood::solve::{Effort, Fit, neutral};
 use crate::model::hypothesis::EffectInstance;
 use crate::search::acceptance::{ABOVE_FLOOR, Ground, UNEXPLAINED};
 use crate::search::attribute::SearchNode;
+use crate::search::belief::Cause;
 use crate::search::model_search::Attribution;
 use armgap_core::arm::Arm;
-use armgap_core::effect::Trial;
+use armgap_core::effect::{Scope, Trial};
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -81,6 +82,14 @@ impl Evidence {
         beyond * self.selected * odds / (1.0 + odds)
     }
 
+    /// Takes note that an unnamed law, in the place of the cause and perhaps of others, leaves the part `left` of the gap that the causes leave.
+    fn leave_at_most(&mut self, left: f64) {
+        if let Some(gain) = self.gain {
+            let of_law = 1.0 + gain - left;
+            self.rival_gain = Some(self.rival_gain.map_or(of_law, |rival| rival.max(of_law)));
+        }
+    }
+
     /// Gap left by an unnamed law (a table over one or two variables) in the cause's place, relative to the gap that the cause leaves: 0 to 1.
     fn left_by_rival(&self) -> f64 {
         let (Some(gain), Some(rival)) = (self.gain, self.rival_gain) else { return 1.0 };
@@ -99,18 +108,36 @@ impl Evidence {
     }
 }
 
+/// A model whose causes are weighed.
+#[derive(Clone, Copy)]
+pub(crate) struct Weighed<'a, const N: usize, const P: usize> {
+    /// Last node of the model search, with the weights of windows by which models are judged.
+    pub last: &'a SearchNode<N, P>,
+    /// The model, fitted to the training logs.
+    pub model: &'a Fit<P>,
+    /// The model, fitted to the holdout.
+    pub on_holdout: &'a Fit<P>,
+    /// Fits to the training logs without one of the model's effects each, in the order of the effects; those after the last are unknown.
+    pub without: &'a [Fit<P>],
+}
+
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
     /// Computes strength, evidence and probability of all causes that a model search has found.
     ///
     /// The strength of a cause is what the predictions lose without it while everything else keeps its value. What the parameters and the other causes
     /// could take over depends on the windows' length, and with it the order of causes that are about as strong.
     pub(crate) fn weigh(&self, attribution: &mut Attribution<N, P>) {
-        let Some(last) = attribution.nodes.last() else { return };
-        if attribution.causes.is_empty() {
+        let Attribution { model, on_holdout, without, causes, nodes, .. } = attribution;
+        let Some(last) = nodes.last() else { return };
+        self.weigh_in(&Weighed { last, model, on_holdout, without }, causes);
+    }
+
+    /// Computes strength, evidence and probability of causes in a model that has them.
+    pub(crate) fn weigh_in(&self, weighed: &Weighed<'_, N, P>, causes: &mut [Cause]) {
+        if causes.is_empty() {
             return;
         }
-        let Attribution { model, on_holdout, without, causes, .. } = attribution;
-        let (model, on_holdout, reduced) = (&*model, &*on_holdout, &*without);
+        let Weighed { last, model, on_holdout, without: reduced } = *weighed;
         let held_out = |fit: &Fit<P>| self.judged_on_holdout(&last.weights, fit).0;
         let in_training = |fit: &Fit<P>| self.problem(&last.weights.training).window_costs(&fit.hypothesis);
         let total = |costs: Vec<f64>| costs.iter().sum::<f64>();
@@ -123,6 +150,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let per_window = |fit: &Fit<P>| if judged_in_training { in_training(fit) } else { held_out(fit) };
         let full = total(per_window(model));
         let error = self.holdout_error(&last.weights, &model.hypothesis);
+        let has_rivals = rest.is_some() && !judged_in_training;
+        let besides = if has_rivals { self.laws_beside(model, &last.weights, true) } else { Vec::new() };
         causes.par_iter_mut().for_each(|cause| {
             let Some(place) = model.hypothesis.effects.iter().position(|e| e.same_place(&cause.effect))
             else {
@@ -144,8 +173,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
                     cause.ground = Ground::Motion;
                 }
                 let effect = &model.hypothesis.effects[place];
-                let rival = || self.rival_cost(&taken_out, effect, &last.weights);
-                let rival = (!judged_in_training).then(rival).flatten();
+                let rival = || self.rival_cost(&taken_out, &[*effect], &besides, &last.weights);
+                let rival = has_rivals.then(rival).flatten();
                 cause.evidence.rival_gain = rival.map(|rival| (bare - rival) / rest);
             }
             if let Some((ratio, sigma)) = size_ratio(place, model, on_holdout) {
@@ -153,11 +182,41 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             }
             cause.evidence.beyond_scatter = zero_of(&model.hypothesis.effects[place])
                 .and_then(|(joint, shared)| last.weights.holdout.zeros.odds_of_shared(joint, shared));
-            if cause.ground == Ground::Motion {
-                cause.probability = cause.evidence.probability();
-            }
         });
+        for set in on_one_joint(causes) {
+            let Some(rest) = rest.filter(|_| has_rivals) else { break };
+            let mut taken_out = model.hypothesis.clone();
+            let is_of_set = |e: &EffectInstance| set.iter().any(|i| causes[*i].effect.same_place(e));
+            let (effects, others) = taken_out.effects.iter().copied().partition(is_of_set);
+            taken_out.effects = others;
+            let effects: Vec<EffectInstance> = effects;
+            if let Some(rival) = self.rival_cost(&taken_out, &effects, &besides, &last.weights) {
+                let left = (rival - full + rest) / rest;
+                set.iter().for_each(|i| causes[*i].evidence.leave_at_most(left));
+            }
+        }
+        for cause in causes.iter_mut().filter(|cause| cause.ground == Ground::Motion) {
+            cause.probability = cause.evidence.probability();
+        }
     }
+}
+
+/// Sets of two and more causes on one joint (by index) in whose place one table may stand: all on the joint, and all but the one with the largest gain.
+fn on_one_joint(causes: &[Cause]) -> Vec<Vec<usize>> {
+    let acts_on = |i: &usize, joint: usize| {
+        let effect = &causes[*i].effect;
+        effect.joint == joint && effect.law.spec().scope == Scope::Joint && !effect.law.has_transmission()
+    };
+    let gain = |i: usize| causes[i].evidence.gain.unwrap_or(0.0);
+    let joints = causes.iter().map(|cause| cause.effect.joint + 1).max().unwrap_or(0);
+    let mut sets = Vec::new();
+    for joint in 0..joints {
+        let mut on_joint: Vec<usize> = (0..causes.len()).filter(|i| acts_on(i, joint)).collect();
+        on_joint.sort_by(|a, b| gain(*b).total_cmp(&gain(*a)));
+        let weaker = on_joint.get(1..).unwrap_or_default().to_vec();
+        sets.extend([on_joint, weaker].into_iter().filter(|set| set.len() > 1));
+    }
+    sets
 }
 
 /// Joint (from 0) whose encoder zero an effect shifts, and the shift, rad or m; a tilted base shifts that of the first joint of an arm in a plane.
@@ -263,6 +322,35 @@ mod tests {
         let odds = PRIOR_ODDS * 0.5_f64.powi(RIVAL_POWER);
         assert!((beside(1.5) - odds / (1.0 + odds)).abs() < 1e-12);
         assert_eq!(beside(2.5), 0.0);
+    }
+
+    #[test]
+    fn one_law_may_stand_in_the_place_of_several_causes() {
+        let cause = |name: &str, joint: usize, gain: f64| {
+            let effect = EffectInstance::new(find::<f64>(name).unwrap(), joint, [0.1, 0.1, 0.0]);
+            Cause {
+                effect,
+                sigma: Vec::new(),
+                probability: 1.0,
+                share: 0.5,
+                relevance: 0.1,
+                look_alikes: Vec::new(),
+                evidence: evidence(gain, None),
+                ground: Ground::Motion,
+            }
+        };
+        let friction = ["quadratic_drag", "friction_warmup", "cubic_drag"];
+        let three: Vec<Cause> =
+            friction.iter().zip([0.5, 4.0, 0.7]).map(|(name, gain)| cause(name, 0, gain)).collect();
+        assert_eq!(on_one_joint(&three), [vec![1, 2, 0], vec![2, 0]]);
+        assert_eq!(on_one_joint(&three[..2]), [vec![1, 0]]);
+        assert!(on_one_joint(&[cause("stribeck", 0, 1.0), cause("stribeck", 1, 1.0)]).is_empty());
+        assert!(on_one_joint(&[cause("stribeck", 0, 1.0), cause("base_tilt", 0, 1.0)]).is_empty());
+        let mut weighed = three[0].evidence;
+        weighed.leave_at_most(0.5);
+        assert!((weighed.left_by_rival() - 0.5).abs() < 1e-12);
+        weighed.leave_at_most(0.9);
+        assert!((weighed.left_by_rival() - 0.5).abs() < 1e-12, "the better law counts");
     }
 
     #[test]

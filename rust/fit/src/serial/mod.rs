@@ -9,6 +9,7 @@
 mod constants;
 pub mod controller;
 mod predict;
+mod pushes;
 mod result;
 mod search;
 mod term;
@@ -27,7 +28,8 @@ use crate::result::report::Diagnosis;
 use armgap_core::chain::{Chain, ChainJoint, JointKind, PARAMETERS_PER_JOINT};
 use armgap_core::effect::{Quantity, Scope, Trial};
 use controller::{PositionController, commanded};
-use search::{Motion, Search};
+use pushes::Event;
+use search::{Found, Motion, Search};
 use std::time::Instant;
 use term::controller_term::{ControllerTerm, Setting};
 use term::table::Table;
@@ -157,15 +159,6 @@ impl Request<'_> {
         };
         training.equation.regularise(&widths);
         holdout.equation.regularise(&widths);
-        let is_feasible = |values: &[f64], apart: &[usize]| {
-            // A motor with a position of its own leaves the links without its inertia.
-            let conditioning = |values: &[f64]| {
-                let is_apart = |i: usize| i >= 10 * N && apart.contains(&(i - 10 * N));
-                let links = std::array::from_fn(|i| if is_apart(i) { 0.0 } else { values[i] });
-                training.equation.conditioning(&links)
-            };
-            conditioning(values) > constants::CONDITIONED * conditioning(&theta).max(0.0)
-        };
         let mut candidates = candidates(&arm, &theta, &training.data.tracks, self.options.known_units);
         if self.options.half_width.is_some() {
             candidates.retain(|group| !constants::ROUNDED_BY_LOW_PASS.contains(&group[0].name()));
@@ -179,21 +172,69 @@ impl Request<'_> {
             let period = training.data.tracks.first().map_or(0.0, Track::period);
             candidates.extend(controller_settings(controller, &inertia, period));
         }
+        let mut found = self.searched(&training, &holdout, &prior, &candidates, &progress);
+        let mut events = Vec::new();
+        for _ in 0..PUSH_ROUNDS {
+            if controller.is_some() || self.options.max_causes == 0 {
+                break;
+            }
+            let new = pushed(&training, &holdout, &found);
+            if new.is_empty() {
+                break;
+            }
+            let logs = training.data.tracks.len();
+            let of = |held: bool| new.iter().filter(move |event| (event.log >= logs) == held);
+            training.equation.leave_out(&of(false).collect::<Vec<&Event>>());
+            let of_holdout = of(true).map(|event| Event { log: event.log - logs, ..event.clone() });
+            holdout.equation.leave_out(&of_holdout.collect::<Vec<Event>>().iter().collect::<Vec<&Event>>());
+            found = self.searched(&training, &holdout, &prior, &candidates, &progress);
+            events.extend(new);
+        }
+        add_pushes(&mut training, &mut holdout, &events);
+        let mut diagnosis = result::assemble(
+            self.arm,
+            &arm,
+            &training,
+            &holdout,
+            &found,
+            (self.options, &widths, &events),
+            &progress,
+        );
+        diagnosis.seconds = started.elapsed().as_secs_f64();
+        Ok(diagnosis)
+    }
+
+    /// Result of the model search on the logs.
+    fn searched<const N: usize, const P: usize>(
+        &self,
+        training: &Set<N, P>,
+        holdout: &Set<N, P>,
+        prior: &Prior,
+        candidates: &[Vec<Term>],
+        progress: &ProgressReporter,
+    ) -> Found {
+        let nominal = &self.arm.theta;
+        let is_feasible = |values: &[f64], apart: &[usize]| {
+            // A motor with a position of its own leaves the links without its inertia.
+            let conditioning = |values: &[f64]| {
+                let is_apart = |i: usize| i >= 10 * N && apart.contains(&(i - 10 * N));
+                let links = std::array::from_fn(|i| if is_apart(i) { 0.0 } else { values[i] });
+                training.equation.conditioning(&links)
+            };
+            conditioning(values) > constants::CONDITIONED * conditioning(nominal).max(0.0)
+        };
         let search = Search {
             training: &training.equation,
             holdout: &holdout.equation,
-            prior: &prior,
-            candidates,
+            prior,
+            candidates: candidates.to_vec(),
             rotary: self.arm.rotary(),
+            steps: training.data.tracks.first().map_or_else(Vec::new, |track| track.step.to_vec()),
             period: training.data.tracks.first().map_or(0.0, Track::period),
             is_feasible: &is_feasible,
-            progress: &progress,
+            progress,
         };
-        let found = search.run(self.options.max_causes, self.options.seed);
-        let mut diagnosis =
-            result::assemble(self.arm, &arm, &training, &holdout, &found, (self.options, &widths), &progress);
-        diagnosis.seconds = started.elapsed().as_secs_f64();
-        Ok(diagnosis)
+        search.run(self.options.max_causes, self.options.seed)
     }
 
     /// Prior of the regression: the arm's parameters, then the controllers' estimated gains as differences from the arm file's gains, zero a priori.
@@ -237,6 +278,37 @@ impl Request<'_> {
             return Err(DiagnoseError::TooShort { set, windows: data.windows.len(), needed: FEWEST_WINDOWS });
         }
         Ok(Set { equation, data })
+    }
+}
+
+/// Largest number of times that pushes are looked for, each time beside those found before: with them in the logs a first model may be wrong.
+const PUSH_ROUNDS: usize = 2;
+
+/// Pushes in what the reported model leaves of the torques of all logs; logs of the holdout count on from those of the training logs.
+fn pushed<const N: usize, const P: usize>(
+    training: &Set<N, P>,
+    holdout: &Set<N, P>,
+    found: &Found,
+) -> Vec<Event> {
+    let model = &found.reported;
+    let mut logs = pushes::residuals(&training.equation, &model.estimate.residual);
+    logs.extend(pushes::residuals(&holdout.equation, &model.held));
+    pushes::pushes(&logs, &model.estimate.theta[P - N..P])
+}
+
+/// Adds the pushes of events to the logs, for predictions.
+fn add_pushes<const N: usize, const P: usize>(
+    training: &mut Set<N, P>,
+    holdout: &mut Set<N, P>,
+    events: &[Event],
+) {
+    let tracks = training.data.tracks.iter_mut().chain(&mut holdout.data.tracks);
+    for (log, track) in tracks.enumerate() {
+        let begin = track.t.first().copied().unwrap_or(0.0);
+        for (push, _) in events.iter().filter(|event| event.log == log).flat_map(Event::pushes) {
+            let [impulse, time, duration] = push.p;
+            track.pushes.push(EffectInstance { p: [impulse, begin + time, duration], ..push });
+        }
     }
 }
 

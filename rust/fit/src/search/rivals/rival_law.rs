@@ -10,7 +10,7 @@ use crate::likelihood::context::{DiagnosisContext, SplitWeighting, WindowSet};
 use crate::likelihood::solve::{Effort, Fit};
 use crate::locate::dependence::Dependence;
 use crate::locate::log_residual::LogResidual;
-use crate::locate::table_form::{MotionPoint, TableForm};
+use crate::locate::table_form::{Factor, MotionPoint, TableForm};
 use crate::locate::unnamed::{MAX_TABLES, Wanted, dependences};
 use crate::log::track::Track;
 use crate::model::custom_effect::{self, UNNAMED};
@@ -25,6 +25,20 @@ use nalgebra::SVector;
 /// Torques of a cause on all joints, by log and sample, N m or N.
 type CauseTorques<const N: usize> = Vec<Vec<SVector<f64, N>>>;
 
+/// A table of torque beside all causes of a model.
+#[derive(Debug, Clone)]
+pub(crate) struct LawBeside {
+    /// The table.
+    pub law: Dependence,
+    /// Cost on the holdout of the model with the table added.
+    pub cost: f64,
+}
+
+/// Largest share of the mean square of a cause's torque that neighbours in the order of a variable do not have in common, for the torque to be a function
+/// of this variable: a smooth function has 1e-4 or less, one with a jump about the inverse of the number of samples, and a torque that is no function
+/// of the variable about one.
+const NOT_IN_COMMON: f64 = 0.05;
+
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
     /// Tables of a model's residual torque over one or two variables of the motion each, strongest first, fitted to the training logs: those that remove a
     /// considerable share of the holdout's gap, each added to the model with everything fitted again.
@@ -33,18 +47,17 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         model: &Fit<P>,
         weights: &SplitWeighting<N>,
         rotary: bool,
-    ) -> Vec<Dependence> {
+    ) -> Vec<LawBeside> {
         let full = self.holdout_cost(weights, model);
         let rest = full - self.floor(weights);
         let no_cause = [Vec::new(), Vec::new()];
-        let predicts = |law: &Dependence| {
-            full - self.cost_beside(&model.hypothesis, law, &no_cause, weights) > MATTERS * rest
-        };
         let forms = |torques: &[f64], own| with_two(TableForm::listed(torques, own), own, torques.len());
-        let mut laws =
-            self.dependences(&model.hypothesis, Wanted { most: MAX_TABLES, rotary, forms: &forms });
-        laws.retain(predicts);
-        laws
+        let found = self.dependences(&model.hypothesis, Wanted { most: MAX_TABLES, rotary, forms: &forms });
+        let fitted = found.into_iter().map(|law| {
+            let cost = self.cost_beside(&model.hypothesis, &law, &no_cause, weights);
+            LawBeside { law, cost }
+        });
+        fitted.filter(|beside| full - beside.cost > MATTERS * rest).collect()
     }
 
     /// Tables of a model's residual torque by inverse dynamics, strongest first, fitted to the training logs.
@@ -64,15 +77,19 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         set.data.tracks.iter().map(|track| LogResidual::new(&self.arm, track, model, in_training)).collect()
     }
 
-    /// Least cost on the holdout of the model `without` a cause and with a table of torque added, on each joint the one that best predicts the model's
+    /// Least cost on the holdout of the model `without` some causes and with a table of torque added, on each joint the one that best predicts the model's
     /// residual torque, of all forms that a rival may have; none where no table predicts it.
+    ///
+    /// A table over the variable of which the causes' torque is a function is such a rival also where it stands `beside` them: all together are a
+    /// table over this variable, of which the causes' forms give what the table's classes do not resolve.
     pub(crate) fn rival_cost(
         &self,
         without: &Hypothesis<P>,
-        cause: &EffectInstance,
+        causes: &[EffectInstance],
+        besides: &[LawBeside],
         weights: &SplitWeighting<N>,
     ) -> Option<f64> {
-        let with = without.with(*cause);
+        let with = causes.iter().fold(without.clone(), |model, cause| model.with(*cause));
         let beside = |set, in_training| -> Vec<Option<LogResidual<N>>> {
             let both = self.residuals(set, without, in_training).into_iter().zip(self.residuals(
                 set,
@@ -91,7 +108,10 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let torques = [along(&self.training, &training), along(&self.holdout, &holdout)];
         let forms = |torques: &[f64], joint: usize| {
             let mut forms = with_two(TableForm::rivals(torques, joint), joint, torques.len());
-            if is_varied(cause) && joint == cause.joint {
+            if let [cause] = causes
+                && is_varied(cause)
+                && joint == cause.joint
+            {
                 forms.extend(TableForm::varied(torques.len(), joint));
             }
             forms
@@ -100,7 +120,9 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let wanted = Wanted { most: 1, rotary: true, forms: &forms };
         let rivals = dependences(&self.arm, &without.theta, &self.prior, &logs, wanted);
         let cost = |rival: &Dependence| self.cost_beside(without, rival, &torques, weights);
-        rivals.iter().map(cost).min_by(f64::total_cmp)
+        let finer =
+            besides.iter().filter(|beside| is_over_the_same(&beside.law, &logs)).map(|beside| beside.cost);
+        rivals.iter().map(cost).chain(finer).min_by(f64::total_cmp)
     }
 
     /// Cost on the holdout of a model with the torques of the table `law` added, everything fitted again to the training logs; `causes`: torques in the
@@ -121,6 +143,28 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let fit = beside.problem(&weights.training).solve(&model.with(effect), Effort::FULL);
         beside.holdout_cost(weights, &fit)
     }
+}
+
+/// Whether the torque of the cause in `logs` is a function of the one variable of the table `law`, on the joint of the table.
+fn is_over_the_same<const N: usize>(law: &Dependence, logs: &[LogResidual<N>]) -> bool {
+    if law.form.second.is_some() || law.form.factor != Factor::One {
+        return false;
+    }
+    let of_log = |log: &LogResidual<N>| {
+        let torque = |k: usize| log.cause_of(law.joint - 1, k);
+        log.along(law.form).into_iter().enumerate().map(|(k, place)| (place.x, torque(k))).collect::<Vec<_>>()
+    };
+    is_function_of(logs.iter().flat_map(of_log).collect())
+}
+
+/// Whether the second values of pairs are a function of the first, from the mean square difference of neighbours in their order (von Neumann, Ann. Math.
+/// Stat. 12, 1941); values that do not vary are functions of nothing in particular.
+fn is_function_of(mut pairs: Vec<(f64, f64)>) -> bool {
+    pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mean = pairs.iter().map(|pair| pair.1).sum::<f64>() / pairs.len().max(1) as f64;
+    let variance: f64 = pairs.iter().map(|pair| (pair.1 - mean).powi(2)).sum();
+    let successive: f64 = pairs.windows(2).map(|two| 0.5 * (two[1].1 - two[0].1).powi(2)).sum();
+    variance > NOT_IN_COMMON * mean * mean * pairs.len() as f64 && successive < NOT_IN_COMMON * variance
 }
 
 /// Forms of tables over one variable on joint `own` (from 0) of `n`, and those over two.
@@ -153,4 +197,22 @@ fn with_torques<const N: usize>(data: &Dataset<N>, law: &Dependence, causes: &Ca
         track.tables.push(torques);
     }
     data
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_torque_is_a_function_of_the_variable_that_orders_it() {
+        let x = |k: u32| (0.7 * f64::from(k)).sin();
+        let pairs = |of: &dyn Fn(u32) -> f64| (0..500).map(|k| (x(k), of(k))).collect::<Vec<_>>();
+        assert!(is_function_of(pairs(&|k| x(k) * x(k).abs())));
+        assert!(is_function_of(pairs(&|k| x(k).signum())));
+        assert!(!is_function_of(pairs(&|k| f64::from(k % 7))));
+        assert!(!is_function_of(pairs(&|k| x(k) * (0.7 * f64::from(k)).cos().signum())));
+        // A constant torque is a function of every variable, and no table over one of them is its rival.
+        assert!(!is_function_of(pairs(&|_| 2.0)));
+        assert!(!is_function_of(Vec::new()));
+    }
 }

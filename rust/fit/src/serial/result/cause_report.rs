@@ -1,16 +1,18 @@
 //! Causes in the form of the diagnosis result, and the status of every effect that was looked for and is not named.
 
+use crate::model::hypothesis::EffectInstance;
 use crate::result::report::{
     Bound, Cause, CauseValue, EquivalentSummary, Named, RuledOut, SeveralJoints, Status, Value, Values,
 };
 use crate::search::rivals::equivalent::on_same_joints;
 use crate::serial::constants::{CONSEQUENCE, NOTICED, ROUNDED_BY_LOW_PASS};
 use crate::serial::controller::PositionController;
+use crate::serial::pushes::Event;
 use crate::serial::result::controller_report::behind_controller;
 use crate::serial::search::{Found, Tested};
 use crate::serial::term::transmission::TransmissionLaw;
 use crate::serial::term::{Term, TermKind, TermParameter};
-use armgap_core::effect::{Effect, Scope, Trial, catalogue};
+use armgap_core::effect::{Effect, EffectParameter, PulseShape, Scope, Trial, catalogue};
 
 /// One-sided 95 % quantile of the standard normal distribution, for upper confidence limits of the sizes of effects.
 const NORMAL_95_ONE_SIDED: f64 = 1.645;
@@ -23,6 +25,8 @@ const NOT_EXCITED: f64 = 0.2;
 const HIDES: f64 = 0.01;
 
 const NOT_TESTED: &str = "not tested on serial arms from such logs";
+
+const NO_PUSH: &str = "no push stands out of what the model lacks in any of these logs";
 
 /// Reason why an effect of [`ROUNDED_BY_LOW_PASS`] is neither named nor absent.
 const ROUNDED: &str = "not told from low-passed positions, whose friction is rounded at reversals";
@@ -120,12 +124,40 @@ pub(in crate::serial) fn cause(
     cause
 }
 
+/// Pushes of one event in the log of a given name, one cause for each joint that the event acts on.
+pub(in crate::serial) fn pushes_of(event: &Event, log: &str, rotary: &[bool]) -> Vec<Cause> {
+    let of_joint = |(push, sigma): (EffectInstance, [f64; 3])| {
+        let spec = push.law.spec();
+        let value = |((parameter, value), sigma): ((&EffectParameter, f64), f64)| {
+            let unit = parameter.quantity.unit(rotary[push.joint]);
+            (parameter.name.to_owned(), CauseValue::One(Value { value, sigma, unit }))
+        };
+        Cause {
+            effect: spec.name,
+            title: spec.title,
+            joint: push.joint_number(),
+            on: SeveralJoints::default(),
+            probability: event.probability,
+            parameters: spec.parameters.iter().zip(push.p).zip(sigma).map(value).collect(),
+            closed: event.share,
+            equivalents: Vec::new(),
+            evidence: None,
+            sides: None,
+            log: Some(log.to_owned()),
+            shape: push.law.pulse_shape().map(PulseShape::name),
+        }
+    };
+    event.pushes().into_iter().map(of_joint).collect()
+}
+
 /// Status of every effect, joint by joint, that is not among the causes that were found, undecided for effects that are not tested; `unexplained` is
-/// the RMS torque that the final model leaves unexplained, relative to the RMS torque, by joint.
+/// the RMS torque that the final model leaves unexplained, relative to the RMS torque, by joint; `pushed` are the joints (from 1) on which pushes were
+/// found, `None` where none were looked for.
 pub(in crate::serial) fn ruled_out(
     found: &Found,
     unexplained: &[Option<f64>],
     rotary: &[bool],
+    pushed: Option<&[usize]>,
 ) -> Vec<RuledOut> {
     let named = |t: &Tested| found.named.iter().any(|n| n.term.same_place(&t.term));
     let mut all: Vec<RuledOut> =
@@ -138,17 +170,20 @@ pub(in crate::serial) fn ruled_out(
         let spec = law.spec();
         match spec.trial {
             _ if spec.scope != Scope::Joint => None,
-            Trial::Disturbance => Some(NOT_TESTED),
-            _ => ROUNDED_BY_LOW_PASS.contains(&spec.name).then_some(ROUNDED),
+            Trial::Disturbance if pushed.is_some() => Some((Status::Absent, NO_PUSH)),
+            Trial::Disturbance => Some((Status::Undecided, NOT_TESTED)),
+            _ => ROUNDED_BY_LOW_PASS.contains(&spec.name).then_some((Status::Undecided, ROUNDED)),
         }
     };
-    for (law, why) in catalogue::<f64>().iter().filter_map(|law| Some((law, why(*law)?))) {
-        let open = (0..rotary.len()).filter(|j| !is_tested(law.spec().name, *j));
+    for (law, (status, why)) in catalogue::<f64>().iter().filter_map(|law| Some((law, why(*law)?))) {
+        let named =
+            |j: usize| law.spec().trial == Trial::Disturbance && pushed.is_some_and(|p| p.contains(&(j + 1)));
+        let open = (0..rotary.len()).filter(|j| !is_tested(law.spec().name, *j) && !named(*j));
         all.extend(open.map(|j| RuledOut {
             effect: law.spec().name,
             joint: Some(j + 1),
             on: SeveralJoints::default(),
-            status: Status::Undecided,
+            status,
             bound: None,
             why: Some(why.to_owned()),
         }));

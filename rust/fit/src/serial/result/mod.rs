@@ -17,10 +17,12 @@ use crate::result::report::{
 };
 use crate::result::training_gap::remark;
 use crate::result::verdict::{Evidence, is_improved, stands_out};
+use crate::serial::constants::CONSEQUENTIAL_SERIAL_ERROR;
 use crate::serial::controller::PositionController;
 use crate::serial::controller::closed_loop::ClosedLoop;
 use crate::serial::predict::{Model, floor};
-use crate::serial::result::cause_report::{cause, ruled_out};
+use crate::serial::pushes::Event;
+use crate::serial::result::cause_report::{cause, pushes_of, ruled_out};
 use crate::serial::result::controller_report::{gains_note, with_settings};
 use crate::serial::search::fitting::Fitted;
 use crate::serial::search::{self, Found};
@@ -50,14 +52,15 @@ struct Compared<const N: usize, const P: usize> {
     floor: Vec<f64>,
 }
 
-/// Diagnosis of a serial arm as data, from the result `found` of the model search.
+/// Diagnosis of a serial arm as data, from the result `found` of the model search; `events` are the pushes in the logs, of which those of the holdout
+/// count on from the training logs.
 pub(crate) fn assemble<const N: usize, const P: usize>(
     description: &SerialArm,
     arm: &Chain<f64, N>,
     training: &Set<N, P>,
     holdout: &Set<N, P>,
     found: &Found,
-    (options, widths): (&Options, &[f64]),
+    (options, widths, events): (&Options, &[f64], &[Event]),
     progress: &ProgressReporter,
 ) -> Diagnosis {
     progress.begin(Phase::Result, 6);
@@ -69,7 +72,7 @@ pub(crate) fn assemble<const N: usize, const P: usize>(
     let data = &holdout.data;
     let mut predicted = [0, 1, 2].map(|i| {
         progress.unit();
-        models[i].predict(data)
+        predictions(&models, i, data)
     });
     let measured = data.measured();
     let floor: Vec<f64> = floor(data, &noise).iter().map(|v| v.sqrt()).collect();
@@ -91,11 +94,15 @@ pub(crate) fn assemble<const N: usize, const P: usize>(
     let unconfirmed = commanded.is_some()
         && !hidden.is_empty()
         && !is_improved(if others.is_empty() { &refit_missed } else { &missed_beside }, &missed(2), &floor);
-    let (named, candidates) = causes(found, [contradicted, unconfirmed], &rotary, commanded);
+    let (mut named, candidates) = causes(found, [contradicted, unconfirmed], &rotary, commanded);
+    let tracks: Vec<&str> =
+        training.data.tracks.iter().chain(&holdout.data.tracks).map(|track| track.name.as_str()).collect();
+    named.extend(events.iter().flat_map(|event| pushes_of(event, tracks[event.log], &rotary)));
     let none_stays = contradicted || unconfirmed && others.is_empty();
     let reported = if none_stays { &found.refit_feasible } else { &found.reported };
     if none_stays {
-        (models[2], predicted[2]) = (models[1].clone(), predicted[1].clone());
+        models[2] = models[1].clone();
+        predicted[2] = models[2].predict(data);
     } else if unconfirmed {
         (models[2], predicted[2]) = (beside, predicted_beside);
     }
@@ -103,9 +110,10 @@ pub(crate) fn assemble<const N: usize, const P: usize>(
     let mut gap = gap(&compared, data, &rotary, options);
     let [_, refit, with_causes] = self::models(description, arm, training, found);
     let on_training = if none_stays { refit } else { with_causes };
-    gap.training = (named.is_empty() && !stands_out(&gap.after, &gap.floor, &gap.motion))
-        .then(|| training_gap(&training.data, &on_training))
-        .flatten();
+    gap.training = (named.is_empty()
+        && !stands_out(&gap.after, &gap.floor, &gap.motion, CONSEQUENTIAL_SERIAL_ERROR))
+    .then(|| training_gap(&training.data, &on_training))
+    .flatten();
     let evidence = Evidence {
         named: !named.is_empty(),
         open: false,
@@ -115,9 +123,13 @@ pub(crate) fn assemble<const N: usize, const P: usize>(
         after: &gap.after,
         floor: &gap.floor,
         motion: &gap.motion,
+        consequence: CONSEQUENTIAL_SERIAL_ERROR,
     };
     let (verdict, remains) = (evidence.verdict(), evidence.remains());
     let parameters = |theta: &[f64], sigma: &[f64]| values(description, theta, sigma);
+    let looked_for = commanded.is_none() && options.max_causes > 0;
+    let pushed: Option<Vec<usize>> =
+        looked_for.then(|| events.iter().flat_map(|event| event.heights.iter().map(|h| h.0 + 1)).collect());
     let (free_run_series, free_run) = free_runs(&compared, data);
     gap.free_run = free_run;
     let mut notes = notes(found, training, holdout, &rotary);
@@ -131,7 +143,7 @@ pub(crate) fn assemble<const N: usize, const P: usize>(
         energy: Vec::new(),
         causes: named,
         candidates,
-        ruled_out: ruled_out(found, &unexplained(&found.model, holdout), &rotary),
+        ruled_out: ruled_out(found, &unexplained(&found.model, holdout), &rotary, pushed.as_deref()),
         parameters: Parameters {
             nominal: parameters(&description.theta, &description.sigma),
             refit: parameters(&found.refit.estimate.theta, &found.sigma[0]),
@@ -229,6 +241,15 @@ fn model_of<const N: usize, const P: usize>(
     Model::new(arm, std::array::from_fn(|i| theta[i]), terms).behind(closed_loop)
 }
 
+/// Predictions of the model with index `i` of those that a report compares: only the one with the named causes knows of pushes.
+fn predictions<const N: usize, const P: usize>(
+    models: &[Model<N, P>; 3],
+    i: usize,
+    data: &Dataset<N>,
+) -> Vec<f64> {
+    if i == 2 { models[i].predict(data) } else { models[i].predict(&data.without_pushes()) }
+}
+
 /// Share of each joint, 0 to 1, in the squared torque that the re-estimated arm leaves unexplained on the holdout above the position noise, largest
 /// first; each joint's unexplained squared torque is first divided by the joint's whole squared torque. A joint without torque has no share.
 fn places<const N: usize, const P: usize>(found: &Found, holdout: &Set<N, P>) -> Vec<Location> {
@@ -297,7 +318,8 @@ fn training_gap<const N: usize, const P: usize>(
     let after = rms::<N>(&measured, &limited(&measured, &model.predict(data)));
     let noise = std::array::from_fn(|j| median(data.tracks.iter().map(|t| t.noise[j]).collect()));
     let floor: Vec<f64> = floor(data, &noise).iter().map(|v| v.sqrt()).collect();
-    stands_out(&after, &floor, &rms::<N>(&measured, &still(data))).then_some(TrainingErrors { after, floor })
+    stands_out(&after, &floor, &rms::<N>(&measured, &still(data)), CONSEQUENTIAL_SERIAL_ERROR)
+        .then_some(TrainingErrors { after, floor })
 }
 
 /// Positions of the windows' first samples, rad or m, in place of predictions, sample by sample and joint by joint.
@@ -315,7 +337,8 @@ fn at_horizon<const N: usize, const P: usize>(
         return None;
     }
     let measured = data.measured();
-    let missed = |i: usize| rms::<N>(&measured, &limited(&measured, &compared.models[i].predict(&data)));
+    let missed =
+        |i: usize| rms::<N>(&measured, &limited(&measured, &predictions(&compared.models, i, &data)));
     let noise = data.tracks.first().map_or([0.0; N], |t| t.noise);
     Some(AtHorizon {
         horizon_s: horizon,
@@ -364,7 +387,7 @@ fn free_runs<const N: usize, const P: usize>(
 ) -> (Vec<FreeRunSeries>, FreeRun) {
     let data = whole(data);
     let measured = data.measured();
-    let [before, after] = [0, 2].map(|i| limited(&measured, &compared.models[i].predict(&data)));
+    let [before, after] = [0, 2].map(|i| limited(&measured, &predictions(&compared.models, i, &data)));
     let run = FreeRun { before: rms::<N>(&measured, &before), after: rms::<N>(&measured, &after) };
     (free_run_series(&data, &measured, [&before, &after]), run)
 }

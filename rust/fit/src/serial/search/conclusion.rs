@@ -122,7 +122,7 @@ impl Search<'_> {
         let probability = wins * beside_rival(trust, left, RIVAL_POWER);
         let explained = without.estimate.cost - model.estimate.cost + evidence.holdout_gain;
         let mut named = Named { term, unfit: None, sigma, evidence, explained, probability, alike };
-        named.unfit = named.reason_against(&self.rotary);
+        named.unfit = named.reason_against(&self.rotary, &self.steps);
         named
     }
 

@@ -45,6 +45,8 @@ pub struct Search<'a> {
     pub candidates: Vec<Vec<Term>>,
     /// Whether each joint is rotary; a joint that is not is linear.
     pub rotary: Vec<bool>,
+    /// Encoder step of each joint, rad or m; empty where the steps are unknown.
+    pub steps: Vec<f64>,
     /// Sample period, s. A delay or lag below it is an artefact of how torques and positions were sampled, and is not named.
     pub period: f64,
     /// Function that tells whether the inertia matrix along the logs, at given parameters of the arm and without the rotors of given joints (from 0),
@@ -300,6 +302,7 @@ mod tests {
             prior,
             candidates,
             rotary: vec![true; 2],
+            steps: Vec::new(),
             period: 0.0025,
             is_feasible: &|_, _| true,
             progress,

@@ -154,6 +154,11 @@ impl TestFunction {
         (INDEPENDENT_S.max(2.0 * self.half) / (SPACING * self.half)).round() as usize
     }
 
+    /// Half width of the test function, s.
+    pub fn half_width(&self) -> f64 {
+        self.half
+    }
+
     /// Integral of the test function over the sample interval `m`, dimensionless; the sum over all intervals is 1.
     pub fn weight<const N: usize>(&self, m: &Middle<N>) -> f64 {
         let area = |t: f64| {
