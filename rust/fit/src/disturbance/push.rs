@@ -323,6 +323,11 @@ impl Disturbance {
         self.push.p[0].abs() / self.sigma[0]
     }
 
+    /// Casts doubt on the push beside a model that leaves the share `left`, 0 to 1, of the gap unexplained.
+    pub(crate) fn doubt_beside(&mut self, left: f64) {
+        self.probability = beside_remainder(self.probability, belief_beside(left, REMAINDER_DOUBT));
+    }
+
     /// Gaussian pulse with the joint, time and sign of the push.
     fn as_bell(&self) -> Bell {
         let [height, time, width] = self.push.p;

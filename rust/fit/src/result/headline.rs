@@ -122,19 +122,21 @@ fn sorted<T>(
     (named, rest)
 }
 
-/// At most `most` of a search's causes to be named, and the rest with the reasons why they are not.
-fn sorted_causes<const N: usize, const P: usize>(
-    attribution: &Attribution<N, P>,
-    most: usize,
-) -> (Vec<Cause>, Vec<Unnamed<Cause>>) {
-    sorted(attribution.causes.clone(), most, |cause| unfit_in(&attribution.model, cause))
-}
-
 /// Why a cause with the values and standard deviations of a model is not to be named; none if it may be.
 fn unfit_in<const P: usize>(model: &Fit<P>, cause: &Cause) -> Option<String> {
+    unfit(&cause.effect, &sigma_at_its_shape(model, cause), cause.probability)
+}
+
+/// Why a cause has values that no arm has, or a size that is not told from none, whatever its probability; none if it has neither.
+fn no_effect<const P: usize>(model: &Fit<P>, cause: &Cause) -> Option<String> {
+    impossible(&cause.effect, cause.probability)
+        .or_else(|| uncertain(&cause.effect, &sigma_at_its_shape(model, cause)))
+}
+
+/// Standard deviations of a cause's values, that of its size at the values of its shape.
+fn sigma_at_its_shape<const P: usize>(model: &Fit<P>, cause: &Cause) -> Vec<f64> {
     let part = part_at_its_shape(model, &cause.effect);
-    let sigma: Vec<f64> = cause.sigma.iter().map(|sigma| sigma * part).collect();
-    unfit(&cause.effect, &sigma, cause.probability)
+    cause.sigma.iter().map(|sigma| sigma * part).collect()
 }
 
 /// Standard deviation of an effect's size at given values of its shape, as a part of its standard deviation; 1 if the effect has no shape, or the model does
@@ -206,40 +208,41 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     /// Disturbances that are not named are taken out of the logs; if none is named, the search without disturbances counts.
     pub fn headline(&mut self, conclusion: Conclusion<N, P>, most: usize) -> Headline<N, P> {
         let Conclusion { mut attribution, alone, mut disturbances } = conclusion;
-        self.weigh(&mut attribution);
-        let (mut causes, mut candidates) = sorted_causes(&attribution, most);
+        let (mut causes, mut candidates) = self.weighed_causes(&mut attribution, &disturbances, most);
         let pushes_allowed = if most > 0 { usize::MAX } else { 0 };
         disturbances.sort_by(|a, b| b.clarity().total_cmp(&a.clarity()));
-        let (disturbances, disturbance_candidates) =
+        let (mut disturbances, disturbance_candidates) =
             sorted(disturbances, pushes_allowed, |e| unfit(&e.push, &e.sigma, e.probability));
         let mut changed = !disturbance_candidates.is_empty();
         if let Some(alone) = alone.filter(|_| changed && disturbances.is_empty()) {
             attribution = alone;
             self.take_all_windows();
             self.set_pushes(&[]);
-            self.weigh(&mut attribution);
-            (causes, candidates) = sorted_causes(&attribution, most);
+            (causes, candidates) = self.weighed_causes(&mut attribution, &[], most);
             changed = false;
         }
         self.set_pushes(&disturbances);
         changed |= !candidates.is_empty();
-        let Reported { mut model, mut weights, mut open, mut on_holdout } =
+        let Reported { mut model, mut weights, mut open, .. } =
             self.reported(&attribution, &causes, &disturbances, changed);
-        // Without those that are not named, the others may have no size any more, or leave what is no longer explained beside them.
+        // Without those that are not named, the others may have no size any more.
         while changed && !causes.is_empty() {
             refresh(&model, &mut causes);
-            if let Some(last) = attribution.nodes.last() {
-                let weighed = Weighed { last, model: &model, on_holdout: &on_holdout, without: &[] };
-                self.weigh_in(&weighed, &mut causes);
-            }
             let (named, lost) = sorted(causes, most, |cause| unfit_in(&model, cause));
             causes = named;
             if lost.is_empty() {
                 break;
             }
             candidates.extend(lost);
-            Reported { model, weights, open, on_holdout } =
-                self.reported(&attribution, &causes, &disturbances, true);
+            Reported { model, weights, open, .. } = self.reported(&attribution, &causes, &disturbances, true);
+        }
+        if !candidates.is_empty()
+            && let Some(last) = attribution.nodes.last()
+        {
+            // Pushes were looked for beside all causes that were found.
+            let error = |fit: &Fit<P>| self.holdout_error(&last.weights, &fit.hypothesis);
+            let left = (error(&model) / error(&attribution.refit)).min(1.0);
+            disturbances.iter_mut().for_each(|push| push.doubt_beside(left));
         }
         // Whether a gap is open is the search's answer, whose model may hold effects that are not named.
         let asked = (open || changed) && !causes.is_empty();
@@ -272,6 +275,38 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             candidates,
             disturbance_candidates,
         }
+    }
+
+    /// At most `most` of a search's causes to be named, and the rest with the reasons why they are not; `disturbances` are those in the logs.
+    ///
+    /// Causes with values that no arm has, or without a size, only stand for what the library does not have. The others are weighed without them: what
+    /// such a cause took is not explained.
+    fn weighed_causes(
+        &self,
+        attribution: &mut Attribution<N, P>,
+        disturbances: &[Disturbance],
+        most: usize,
+    ) -> (Vec<Cause>, Vec<Unnamed<Cause>>) {
+        self.weigh(attribution);
+        let (mut causes, mut model) = (attribution.causes.clone(), attribution.model.clone());
+        let mut candidates = Vec::new();
+        while let Some(last) = attribution.nodes.last() {
+            let (kept, lost) = sorted(causes, usize::MAX, |cause| no_effect(&model, cause));
+            causes = kept;
+            if lost.is_empty() || causes.is_empty() {
+                candidates.extend(lost);
+                break;
+            }
+            candidates.extend(lost);
+            let beside = self.reported(attribution, &causes, disturbances, true);
+            refresh(&beside.model, &mut causes);
+            let (model_beside, on_holdout) = (&beside.model, &beside.on_holdout);
+            self.weigh_in(&Weighed { last, model: model_beside, on_holdout, without: &[] }, &mut causes);
+            model = beside.model;
+        }
+        let (named, rest) = sorted(causes, most, |cause| unfit_in(&model, cause));
+        candidates.extend(rest);
+        (named, candidates)
     }
 
     /// The arm with its parameters re-estimated and no effects, its standard deviations widened as those of the model with causes are.

@@ -44,7 +44,7 @@ pub enum Kind {
 #[derive(Debug, Clone, PartialEq, JsonSchema, Serialize)]
 pub struct Sanity {
     /// Name of the parameter whose re-estimated value is not to be believed.
-    pub parameter: &'static str,
+    pub parameter: String,
     /// Reason why the re-estimated value of the parameter is not to be believed.
     pub kind: Kind,
     /// Reason in words, with the nominal and the re-estimated value of the parameter.
@@ -92,48 +92,47 @@ fn is_gravity(kind: ArmKind, index: usize) -> bool {
 pub fn sanity(kind: ArmKind, estimates: &[Estimate], remains: bool) -> Vec<Sanity> {
     let stuck = remains && estimates.iter().all(Estimate::is_unmoved);
     let one = |(i, (parameter, estimate)): (usize, (&Parameter, &Estimate))| {
-        let (found, message) = if is_gravity(kind, i) && estimate.is_turned() {
-            (Kind::Sign, turned(parameter, estimate))
-        } else if i >= kind.inertial()
-            && estimate.value == 0.0
-            && estimate.nominal > SIGN_KNOWN * estimate.prior
-        {
-            (
-                Kind::Zero,
-                format!(
-                    "{} came out as zero; the arm file has {}",
-                    parameter.name,
-                    with_unit(estimate.nominal, parameter)
-                ),
-            )
-        } else if estimate.distance() > FAR {
-            (Kind::Sigma, far(parameter, estimate))
-        } else if stuck {
-            (Kind::Unmoved, STUCK.to_owned())
-        } else {
-            return None;
-        };
-        Some(Sanity { parameter: parameter.name, kind: found, message })
+        let named = (parameter.name, parameter.unit);
+        if is_gravity(kind, i) && estimate.is_turned() {
+            return Some(entry(named, Kind::Sign, turned(named, estimate)));
+        }
+        let found = off(named, estimate, i >= kind.inertial());
+        found.or_else(|| stuck.then(|| entry(named, Kind::Unmoved, STUCK.to_owned())))
     };
     kind.parameters().iter().zip(estimates).enumerate().filter_map(one).collect()
 }
 
-fn turned(parameter: &Parameter, estimate: &Estimate) -> String {
-    let (from, to) = (with_unit(estimate.nominal, parameter), with_unit(estimate.value, parameter));
+/// Entry for a parameter, given by name and unit, whose estimate is far from the arm file's value, or that `may_be_zero` and came out as zero against the arm
+/// file; none for other estimates.
+pub fn off(parameter: (&str, &str), estimate: &Estimate, may_be_zero: bool) -> Option<Sanity> {
+    if may_be_zero && estimate.value == 0.0 && estimate.nominal > SIGN_KNOWN * estimate.prior {
+        let given = with_unit(estimate.nominal, parameter.1);
+        let message = format!("{} came out as zero; the arm file has {given}", parameter.0);
+        return Some(entry(parameter, Kind::Zero, message));
+    }
+    (estimate.prior > 0.0 && estimate.distance() > FAR)
+        .then(|| entry(parameter, Kind::Sigma, far(parameter, estimate)))
+}
+
+fn entry((name, _): (&str, &str), kind: Kind, message: String) -> Sanity {
+    Sanity { parameter: name.to_owned(), kind, message }
+}
+
+fn turned((name, unit): (&str, &str), estimate: &Estimate) -> String {
+    let (from, to) = (with_unit(estimate.nominal, unit), with_unit(estimate.value, unit));
     format!(
-        "{} turned gravity over, from {from} to {to}: a zero of the positions or a sign may be another than the arm file's",
-        parameter.name
+        "{name} turned gravity over, from {from} to {to}: a zero of the positions or a sign may be another than the arm file's"
     )
 }
 
-fn far(parameter: &Parameter, estimate: &Estimate) -> String {
-    let (from, to) = (with_unit(estimate.nominal, parameter), with_unit(estimate.value, parameter));
+fn far((name, unit): (&str, &str), estimate: &Estimate) -> String {
+    let (from, to) = (with_unit(estimate.nominal, unit), with_unit(estimate.value, unit));
     let distance = estimate.distance();
-    format!("{} went from {from} to {to}, {distance:.0} standard deviations of the arm file", parameter.name)
+    format!("{name} went from {from} to {to}, {distance:.0} standard deviations of the arm file")
 }
 
-fn with_unit(value: f64, parameter: &Parameter) -> String {
-    format!("{} {}", significant(value), parameter.unit)
+fn with_unit(value: f64, unit: &str) -> String {
+    format!("{} {unit}", significant(value))
 }
 
 /// A number with four significant digits, with an exponent below 1e-3 and from 1e5 on.

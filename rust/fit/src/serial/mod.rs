@@ -52,6 +52,8 @@ pub struct SerialArm {
     pub sigma: Vec<f64>,
     /// Encoder step of each joint, rad or m; `None` where the steps are unknown.
     pub steps: Option<Vec<f64>>,
+    /// Whether the encoder of each joint is on the motor's side of its transmission; `None` where that is unknown.
+    pub encoder_at_motor: Option<Vec<Option<bool>>>,
     /// Position controllers of the arm's joints, needed for logs that hold references in place of torques; `None` where the arm file has none.
     pub controller: Option<PositionController>,
 }
@@ -160,6 +162,15 @@ impl Request<'_> {
         training.equation.regularise(&widths);
         holdout.equation.regularise(&widths);
         let mut candidates = candidates(&arm, &theta, &training.data.tracks, self.options.known_units);
+        if let Some(sides) = &self.arm.encoder_at_motor {
+            let is_possible = |term: &Term| match &term.kind {
+                TermKind::Transmission(law) => {
+                    sides[law.joint].is_none_or(|at_motor| at_motor == law.encoder_at_motor)
+                }
+                _ => true,
+            };
+            candidates.iter_mut().for_each(|group| group.retain(is_possible));
+        }
         if self.options.half_width.is_some() {
             candidates.retain(|group| !constants::ROUNDED_BY_LOW_PASS.contains(&group[0].name()));
         }
@@ -178,7 +189,9 @@ impl Request<'_> {
             if controller.is_some() || self.options.max_causes == 0 {
                 break;
             }
-            let new = pushed(&training, &holdout, &found);
+            let mut new = pushed(&training, &holdout, &found);
+            // Next to a push stays what a raised cosine does not give of it.
+            new.retain(|event| !events.iter().any(|known: &Event| known.overlaps(event)));
             if new.is_empty() {
                 break;
             }

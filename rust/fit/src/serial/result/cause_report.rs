@@ -2,7 +2,8 @@
 
 use crate::model::hypothesis::EffectInstance;
 use crate::result::report::{
-    Bound, Cause, CauseValue, EquivalentSummary, Named, RuledOut, SeveralJoints, Status, Value, Values,
+    Bound, Cause, CauseValue, EquivalentSummary, Named, RuledOut, SeveralJoints, SidesSummary, Status, Value,
+    Values,
 };
 use crate::search::rivals::equivalent::on_same_joints;
 use crate::serial::constants::{CONSEQUENCE, NOTICED, ROUNDED_BY_LOW_PASS};
@@ -115,7 +116,10 @@ pub(in crate::serial) fn cause(
         closed: named.evidence.share.clamp(0.0, 1.0),
         equivalents: named.alike.iter().map(alike).collect(),
         evidence: None,
-        sides: None,
+        sides: match &term.kind {
+            TermKind::Transmission(law) => Some(SidesSummary::of(law.sides())),
+            _ => None,
+        },
         log: None,
         shape: None,
     };

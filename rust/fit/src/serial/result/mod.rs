@@ -2,6 +2,7 @@
 
 pub(in crate::serial) mod cause_report;
 pub(in crate::serial) mod controller_report;
+pub(in crate::serial) mod notes;
 
 use crate::locate::regimes::Location;
 use crate::log::input::Options;
@@ -23,7 +24,8 @@ use crate::serial::controller::closed_loop::ClosedLoop;
 use crate::serial::predict::{Model, floor};
 use crate::serial::pushes::Event;
 use crate::serial::result::cause_report::{cause, pushes_of, ruled_out};
-use crate::serial::result::controller_report::{gains_note, with_settings};
+use crate::serial::result::controller_report::with_settings;
+use crate::serial::result::notes::{notes, regularised, sanity, sanity_note};
 use crate::serial::search::fitting::Fitted;
 use crate::serial::search::{self, Found};
 use crate::serial::term::Term;
@@ -130,10 +132,12 @@ pub(crate) fn assemble<const N: usize, const P: usize>(
     let looked_for = commanded.is_none() && options.max_causes > 0;
     let pushed: Option<Vec<usize>> =
         looked_for.then(|| events.iter().flat_map(|event| event.heights.iter().map(|h| h.0 + 1)).collect());
+    let sanity = sanity(description, &reported.estimate.theta, &found.sigma[1]);
     let (free_run_series, free_run) = free_runs(&compared, data);
     gap.free_run = free_run;
     let mut notes = notes(found, training, holdout, &rotary);
     notes.extend(regularised(widths));
+    notes.extend(sanity_note(&sanity));
     notes.extend((worse && !contradicted && !unconfirmed).then(|| HIDDEN_STATES.to_owned()));
     notes.extend(gap.training.as_ref().map(|errors| remark(errors, &rotary)));
     Diagnosis {
@@ -149,7 +153,7 @@ pub(crate) fn assemble<const N: usize, const P: usize>(
             refit: parameters(&found.refit.estimate.theta, &found.sigma[0]),
             with_causes: parameters(&reported.estimate.theta, &found.sigma[1]),
         },
-        sanity: Vec::new(),
+        sanity,
         arm: summary(description),
         training: logs(&training.data),
         holdout: logs(data),
@@ -393,7 +397,10 @@ fn free_runs<const N: usize, const P: usize>(
 }
 
 /// RMS of the torque that a model leaves unexplained on the holdout, relative to the joint's RMS torque, by joint; `None` for a joint without torque.
-fn unexplained<const N: usize, const P: usize>(set: &Fitted, holdout: &Set<N, P>) -> Vec<Option<f64>> {
+pub(in crate::serial) fn unexplained<const N: usize, const P: usize>(
+    set: &Fitted,
+    holdout: &Set<N, P>,
+) -> Vec<Option<f64>> {
     let square = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>();
     let rows = &holdout.equation.rows;
     let theta = std::array::from_fn(|i| set.estimate.theta[i]);
@@ -436,59 +443,4 @@ fn logs<const N: usize>(data: &Dataset<N>) -> Vec<LogSummary> {
         encoder_zero: None,
     };
     data.tracks.iter().enumerate().map(of).collect()
-}
-
-/// Remark on joints whose Coulomb friction is regularised, `None` if there are none; `widths` by joint, rad/s or m/s, zero for dry friction.
-fn regularised(widths: &[f64]) -> Option<String> {
-    let wide: Vec<String> = widths
-        .iter()
-        .enumerate()
-        .filter(|(_, width)| **width > 0.0)
-        .map(|(j, width)| format!("{width} on joint {}", j + 1))
-        .collect();
-    (!wide.is_empty()).then(|| {
-        format!("the logs fit friction that changes its sign over a width better than dry friction, rad/s (m/s): {}", wide.join(", "))
-    })
-}
-
-/// Remarks of the result: the share of each joint's torque that stays unexplained, joints that do not move in the training logs, and estimated gains
-/// of controllers.
-fn notes<const N: usize, const P: usize>(
-    found: &Found,
-    training: &Set<N, P>,
-    holdout: &Set<N, P>,
-    rotary: &[bool],
-) -> Vec<String> {
-    let mut notes = Vec::new();
-    let shares = |set: &Fitted| -> String {
-        let share = |s: Option<f64>| s.map_or_else(|| "-".to_owned(), |s| format!("{:.1}", 100.0 * s));
-        unexplained(set, holdout).into_iter().map(share).collect::<Vec<_>>().join(", ")
-    };
-    notes.push(format!(
-        "share of each joint's torque that stays unexplained on the holdout (RMS, %): {} with parameters re-estimated",
-        shares(&found.refit)
-    ));
-    if !found.model.terms.is_empty() {
-        notes.push(format!("the same with all terms found: {}", shares(&found.model)));
-    }
-    if found.refit.estimate.theta != found.refit_feasible.estimate.theta {
-        notes.push(
-            "the re-estimated parameters fit the torques, but no arm has their inertia matrix: predictions with them use values nearer to the arm file"
-                .to_owned(),
-        );
-    }
-    let still: Vec<String> = (0..rotary.len())
-        .filter(|j| training.equation.rows.joints[*j].y.is_empty())
-        .map(|j| (j + 1).to_string())
-        .collect();
-    if !still.is_empty() {
-        notes.push(format!(
-            "joint {} does not move in the training logs: nothing is said about it",
-            still.join(", ")
-        ));
-    }
-    let controller = holdout.equation.commanded.as_ref().map(|commanded| &commanded.controller);
-    let gains = |c| gains_note(c, &found.reported.estimate.theta[P..], &found.sigma[1][P..]);
-    notes.extend(controller.and_then(gains));
-    notes
 }

@@ -145,12 +145,12 @@ impl TransmissionLaw {
             }
             Compliance::Backlash => ([size, (rotor_inertia / inertia).clamp(0.005, 0.35), 0.0], 0.0),
         };
-        let sides = if self.encoder_at_motor {
-            Sides::MOTOR
-        } else {
-            Sides { friction_at_motor: true, ..Sides::LINK }
-        };
-        (EffectInstance::new(self.effect(), self.joint, p).with_sides(sides), taken)
+        (EffectInstance::new(self.effect(), self.joint, p).with_sides(self.sides()), taken)
+    }
+
+    /// Sides of encoder and friction: friction is at the motor, where most of a gear's is.
+    pub(in crate::serial) fn sides(self) -> Sides {
+        if self.encoder_at_motor { Sides::MOTOR } else { Sides { friction_at_motor: true, ..Sides::LINK } }
     }
 }
 
