@@ -28,7 +28,7 @@ from armgap.diagnosis.result import Diagnosis
 from armgap.diagnosis.serial_settings import serial_settings
 from armgap.errors import OptionError
 from armgap.evidence import consistency, laws, plausibility
-from armgap.log.conversion.units import si
+from armgap.log.conversion.unit_names import si
 from armgap.log.log import Log
 from armgap.progress import ProgressCallback, report_progress, use_callback
 

@@ -27,7 +27,7 @@ _POWERFUL, _STRONG = 0.94, 0.9
 #: events of such limits count, on ten simulated arms); and factor on the durations of pushes within which that time does not count.
 _BEYOND, _NEAR_PUSH = 0.25, 2.0
 #: Share of the variance of an encoder's error along the logs that a straight line over the position has to explain for a wrong scale to do the same.
-_STRAIGHT = 0.95
+_STRAIGHT_SHARE = 0.95
 #: Time over which velocities are averaged [s].
 _SPEED_S = 0.01
 
@@ -80,7 +80,7 @@ def encoder_scale(data: dict[str, Any], logs: Sequence[Log]) -> None:
         error = a * np.sin(q) + b * np.cos(q)
         if np.ptp(q) == 0.0 or error.std() == 0.0:
             continue
-        if np.corrcoef(q, error)[0, 1] ** 2 > _STRAIGHT:
+        if np.corrcoef(q, error)[0, 1] ** 2 > _STRAIGHT_SHARE:
             why = "over this travel the error is nearly in proportion to the position, as with a wrong gear ratio or counts per turn"
             cause["equivalents"].append(beside("encoder_scale", cause["joint"], why, separates=True))
 

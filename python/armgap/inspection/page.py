@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from armgap.inspection import words
 from armgap.inspection.inspection import Inspection
-from armgap.log.conversion.units import si
+from armgap.log.conversion.unit_names import si
 from armgap.report import charts, page
 from armgap.report.conventions import brief, section
 from armgap.report.page import Section

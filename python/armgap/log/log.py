@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from armgap.errors import ColumnError, OptionError
 from armgap.files.output import write
 from armgap.log import checks, frames
-from armgap.log.conversion import clocks, columns, units
+from armgap.log.conversion import clocks, columns, unit_names, units
 from armgap.log.findings import Finding
 from armgap.log.formats.all import record
 from armgap.log.recording import Recording
@@ -230,7 +230,7 @@ class Log:
         checks.motion(arrays, place, names)
         declared_only = arrays
         arrays, converted = units.recognised(arrays, names, arm, scales.settled)
-        there = units.in_file(
+        there = unit_names.in_file(
             names, scales, ticks, arm, degrees=(arrays.q is not declared_only.q, arrays.dq is not declared_only.dq)
         )
         units.check(arrays, place, names, arm, scales.settled)

@@ -53,7 +53,7 @@ _UNDECIDED = 10.0
 # Ratio of the factor by small torques to that by all, up or down, from which a factor is no unit: a limit of the drive takes large torques alone.
 _NOT_CONSTANT = 1.5
 # Torques that are small: up to this part of a joint's large torque, which is a quantile of all.
-_SMALL, _LARGE_QUANTILE = 0.5, 0.95
+_SMALL_PART, _LARGE_QUANTILE = 0.5, 0.95
 # Difference of two readings' costs, as a part of their gain, below which the readings are alike.
 _ALIKE_COST_PART = 0.02
 
@@ -247,7 +247,7 @@ def _factors(logs: Sequence[Log], arm: Arm) -> tuple[Array, Fit] | None:
 def _is_constant(logs: Sequence[Log], arm: Arm, factors: Array, j: int) -> bool:
     """Whether joint `j`'s (from 0) small torques do not contradict its factor, as they do where the drive limits large ones."""
     found = [rows for _, rows in rows_of(logs, arm)]
-    small = _SMALL * float(np.quantile(np.concatenate([np.abs(rows.y[:, j]) for rows in found]), _LARGE_QUANTILE))
+    small = _SMALL_PART * float(np.quantile(np.concatenate([np.abs(rows.y[:, j]) for rows in found]), _LARGE_QUANTILE))
     used = [np.ones(rows.y.shape, dtype=bool) for rows in found]
     for mask, rows in zip(used, found, strict=True):
         mask[:, j] = np.abs(rows.y[:, j]) <= small

@@ -31,7 +31,7 @@ _AGREEING = 0.75
 # Mean decrease, over joints, of the logarithm of the unexplained part of the mean square torque. Torques late by 10 ms gave 0.96 on a simulated arm
 # of seven joints, those behind a low-pass of 20 ms 1.4 on one of six; arms without this defect gave 0 on nine of ten, and with presliding friction
 # 0.03 and 0.7, which predictions tell from a shift.
-_LEAST_GAIN = 0.2
+_LEAST_SERIAL_GAIN = 0.2
 
 
 def late_torques(logs: Sequence[Log], arm: Arm, *, repair: bool) -> tuple[Corrections, list[Check]]:
@@ -66,7 +66,7 @@ def late_torques(logs: Sequence[Log], arm: Arm, *, repair: bool) -> tuple[Correc
     costs = _costs(halves, arm, shifts)
     best = _minimum(costs, shifts)
     agree = np.mean([_minimum(of_half, shifts) <= -0.5 * _COUNTS for of_half in each])
-    if not -most < best <= -_COUNTS or agree < _AGREEING or costs[most] - costs.min() < _LEAST_GAIN:
+    if not -most < best <= -_COUNTS or agree < _AGREEING or costs[most] - costs.min() < _LEAST_SERIAL_GAIN:
         return Corrections(), []
     shift = float(f"{min(round(best), -1) * period:.6g}")
     corrections = Corrections(shift={"tau": shift})

@@ -1,4 +1,4 @@
-"""`logs_differ`: one arm does not explain all logs of a serial arm, though an arm of its own explains each.
+"""`logs_differ`: one arm does not explain all logs of a serial arm, though one of its own explains each.
 
 A load that is carried in one log, friction that is warm in another, or a changed setting: parameters estimated from all logs together are then
 wrong for each of them.
@@ -20,8 +20,8 @@ __all__ = ["logs_differ"]
 
 Array = NDArray[np.float64]
 
-# Unexplained part of a joint's mean square torque in a log by the parameters of all logs: at least this, and so many times that by the log's own.
-# The log's own parameters take up to a fifth of it by chance.
+# Unexplained part of a joint's mean square torque in a log by the parameters of all logs: at least this, and so many times that by the log's own
+# parameters. These take up to a fifth of it by chance.
 _UNEXPLAINED, _OF_ITS_OWN = 4e-4, 4.0
 
 
@@ -38,28 +38,28 @@ def logs_differ(logs: Sequence[Log], arm: Arm) -> list[Check]:
         Nominal model, of kind ``"serial"``.
     """
     found = [(log, rows) for log, rows in rows_of(logs, arm) if log.has_torques]
-    own = [_unexplained(rows, _fitted([rows], arm)) for _, rows in found]
-    worst = _worst(found, own, arm)
+    alone = [_unexplained(rows, _fitted([rows], arm)) for _, rows in found]
+    worst = _worst(found, alone, arm)
     if worst is None:
         return []
-    name, joint, by_all, by_own = worst
+    name, joint, by_all, by_its_parameters = worst
 
     def agree(left_out: int) -> bool:
         others = [i for i in range(len(found)) if i != left_out]
-        return _worst([found[i] for i in others], [own[i] for i in others], arm) is None
+        return _worst([found[i] for i in others], [alone[i] for i in others], arm) is None
 
     odd = [log.name for i, (log, _) in enumerate(found) if len(found) > 2 and agree(i)]
     what = f"{odd[0]} differs from the other logs, which agree" if len(odd) == 1 else "logs differ from each other"
     message = (
         f"{what}: in {name} {100 * np.sqrt(by_all):.2g} % of joint {joint}'s torque stays unexplained by parameters of all logs (RMS), "
-        f"{100 * np.sqrt(by_own):.2g} % by parameters of its own; a load, friction that is warmer or a setting may have changed"
+        f"{100 * np.sqrt(by_its_parameters):.2g} % by parameters of its own; a load, friction that is warmer or a setting may have changed"
     )
     remedy = "diagnose logs of one state together"
     return [Check("logs_differ", "warning", message, (remedy,), log=odd[0] if len(odd) == 1 else None)]
 
 
 def _worst(
-    found: Sequence[tuple[Log, LogRows]], own: Sequence[Array], arm: Arm
+    found: Sequence[tuple[Log, LogRows]], alone: Sequence[Array], arm: Arm
 ) -> tuple[str, int, float, float] | None:
     """Return the log and joint (from 1) that parameters of all logs explain worst, with the unexplained parts by these and by the log's own.
 
@@ -67,12 +67,12 @@ def _worst(
     """
     together = _fitted([rows for _, rows in found], arm)
     worst: tuple[str, int, float, float] | None = None
-    for (log, rows), by_own in zip(found, own, strict=True):
+    for (log, rows), by_its_parameters in zip(found, alone, strict=True):
         by_all = _unexplained(rows, together)
-        counts = (by_all > _UNEXPLAINED) & (by_all > _OF_ITS_OWN * by_own)
+        counts = (by_all > _UNEXPLAINED) & (by_all > _OF_ITS_OWN * by_its_parameters)
         j = int(np.argmax(np.where(counts, by_all, 0.0)))
         if counts[j] and (worst is None or by_all[j] > worst[2]):
-            worst = log.name, j + 1, float(by_all[j]), float(by_own[j])
+            worst = log.name, j + 1, float(by_all[j]), float(by_its_parameters[j])
     return worst
 
 

@@ -19,14 +19,26 @@ from armgap.log.findings import Finding
 if TYPE_CHECKING:
     from armgap.arm.arm import Arm
 
-__all__ = ["COUNTED", "FACTORS", "Scales", "check", "has_factor", "in_file", "recognised", "scaled", "si", "stated"]
+__all__ = [
+    "COUNTED",
+    "DEGREE",
+    "FACTORS",
+    "Scales",
+    "check",
+    "has_factor",
+    "recognised",
+    "scaled",
+    "slides",
+    "stated",
+    "suits",
+]
 
-_DEGREE = math.pi / 180
+DEGREE = math.pi / 180
 
 FACTORS: dict[str, dict[str, float]] = {
     "t": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},
-    "q": {"rad": 1.0, "mrad": 1e-3, "deg": _DEGREE, "turns": 2 * math.pi, "m": 1.0, "mm": 1e-3},
-    "dq": {"rad/s": 1.0, "mrad/s": 1e-3, "deg/s": _DEGREE, "rpm": math.pi / 30, "m/s": 1.0, "mm/s": 1e-3},
+    "q": {"rad": 1.0, "mrad": 1e-3, "deg": DEGREE, "turns": 2 * math.pi, "m": 1.0, "mm": 1e-3},
+    "dq": {"rad/s": 1.0, "mrad/s": 1e-3, "deg/s": DEGREE, "rpm": math.pi / 30, "m/s": 1.0, "mm/s": 1e-3},
     "tau": {"Nm": 1.0, "mNm": 1e-3, "Ncm": 1e-2, "kgfcm": 0.0980665, "N": 1.0, "kN": 1e3},
 }
 """Factors to SI of the units that can be declared, by group of columns and unit; for those in `COUNTED` the arm file has the factor."""
@@ -115,8 +127,8 @@ def stated(names: Names, declared: Mapping[str, str], arm: Arm | None, place: Pa
         counted = unit is not None and unit == COUNTED.get(group)
         if unit is not None and not (counted and columns is names.q_link):
             # In an arm with rotary and linear joints a unit of angles does not change lengths.
-            suits = _suits(group, unit, arm, j)
-            return (_factor(group, unit, arm, place, columns[j], j) if suits else 1.0), None
+            possible = suits(group, unit, arm, j)
+            return (_factor(group, unit, arm, place, columns[j], j) if possible else 1.0), None
         by_file = names.units.get(columns[j])
         return _by_file(group, columns[j], by_file, arm, place, j), by_file
 
@@ -175,7 +187,7 @@ def scaled(arrays: Arrays, scales: Scales) -> Arrays:
 def _by_file(group: str, column: str, unit: str | None, arm: Arm | None, place: Path | str, j: int) -> float:
     if unit is None:
         return 1.0
-    if unit not in _known(group) or not _suits(group, unit, arm, j):
+    if unit not in _known(group) or not suits(group, unit, arm, j):
         raise UnitError(
             f"is in {unit}, which is no unit of {WORDS[group]}" + (f" of a {arm.kind}" if arm is not None else ""),
             remedy=f"correct the file, or declare the unit with --units {group}=…",
@@ -202,7 +214,7 @@ def _factor(group: str, unit: str, arm: Arm | None, place: Path | str, column: s
 
 def _per_turn(arm: Arm | None, j: int) -> tuple[str, str]:
     """Return that the counts per turn of joint `j` (from 0) are not known, and what to do, in words."""
-    turn = "metre" if _slides(arm, j) else "turn of the joint (of the motor's encoder: times the gear ratio)"
+    turn = "metre" if slides(arm, j) else "turn of the joint (of the motor's encoder: times the gear ratio)"
     if arm is None:
         return (
             "no arm says how many make a turn",
@@ -248,7 +260,7 @@ def _check_declared(key: str, unit: str, arm: Arm | None) -> None:
     if unit not in _known(group):
         raise OptionError(f"`{unit}` is not a unit of {group}", remedy=f"known: {', '.join(_known(group))}")
     judged = [int(joint) - 1] if joint else range(arm.n_joints if arm is not None else 0)
-    if arm is not None and not any(_suits(group, unit, arm, j) for j in judged):
+    if arm is not None and not any(suits(group, unit, arm, j) for j in judged):
         motion = "turns" if arm.rotary else "slides"
         raise OptionError(f"{group} in {unit} does not suit an arm that {motion}", remedy="declare another unit")
 
@@ -259,7 +271,7 @@ def has_factor(key: str, arm: Arm | None) -> bool:
     return key in factors or key.rstrip("0123456789") in factors
 
 
-def _suits(group: str, unit: str, arm: Arm | None, j: int) -> bool:
+def suits(group: str, unit: str, arm: Arm | None, j: int) -> bool:
     """Whether a unit is possible for a column of joint `j` (from 0)."""
     either = group == "t" or unit == COUNTED.get(group)
     return arm is None or either or j >= arm.n_joints or (unit not in _LINEAR) == arm.rotary_joints[j]
@@ -271,13 +283,13 @@ def recognised(arrays: Arrays, names: Names, arm: Arm | None, settled: frozenset
     Nothing is converted if another joint contradicts it, or if the unit is stated; positions that are only large are left to `check`.
     """
     findings: list[Finding] = []
-    turned = np.array([1.0 if _slides(arm, j) else _DEGREE for j in range(arrays.q.shape[1])])
+    turned = np.array([1.0 if slides(arm, j) else DEGREE for j in range(arrays.q.shape[1])])
     if "q" not in settled and not np.all(turned == 1.0) and (why := _degrees(arrays, names, arm)):
         q_ref, q_link = (None if x is None else x * turned for x in (arrays.q_ref, arrays.q_link))
         arrays = replace(arrays, q=arrays.q * turned, q_ref=q_ref, q_link=q_link)
         findings.append(Finding("units", f"positions are in degrees: {why}; converted"))
     if "dq" not in settled and arrays.dq is not None and names.dq is not None and not np.all(turned == 1.0):
-        ratios = [0.0 if _slides(arm, j) else _speed_ratio(arrays, arm, j) for j in range(arrays.q.shape[1])]
+        ratios = [0.0 if slides(arm, j) else _speed_ratio(arrays, arm, j) for j in range(arrays.q.shape[1])]
         slow = [r for r in ratios if r > 0]
         if slow and all(_SURE_RATIO[0] < 1 / r < _SURE_RATIO[1] for r in slow):
             dq_ref = None if arrays.dq_ref is None else arrays.dq_ref * turned
@@ -291,70 +303,18 @@ def _degrees(arrays: Arrays, names: Names, arm: Arm | None) -> str:
     """Return the reason why positions must be in degrees; empty if no joint gives a reason, or a joint contradicts degrees."""
     reasons = []
     for j, name in enumerate(names.q):
-        if _slides(arm, j):
+        if slides(arm, j):
             continue
         ratio = _speed_ratio(arrays, arm, j) if arrays.dq is not None else 0.0
         if ratio > 0 and not _SURE_RATIO[0] < ratio < _SURE_RATIO[1]:
             return ""
         if _moves_in_counts(arrays, arm, j, 1.0):
             return ""
-        if _moves_in_counts(arrays, arm, j, _DEGREE) and not _in_whole_numbers(arrays.q[:, j]):
+        if _moves_in_counts(arrays, arm, j, DEGREE) and not _in_whole_numbers(arrays.q[:, j]):
             reasons.append(f"`{name}` moves in whole encoder counts only if read so")
         elif ratio > 0 and names.dq is not None:
             reasons.append(f"`{name}` moves {ratio:.3g} times faster than `{names.dq[j]}` says")
     return reasons[0] if reasons else ""
-
-
-def si(rotary: bool | None) -> dict[str, str]:
-    """Return the SI unit of each group of columns; rotary and linear units if the kind of the joints is unknown."""
-    turns = {"t": "s", "q": "rad", "dq": "rad/s", "tau": "N m"}
-    slides = {"t": "s", "q": "m", "dq": "m/s", "tau": "N"}
-    if rotary is None:
-        return {group: unit if unit == slides[group] else f"{unit} or {slides[group]}" for group, unit in turns.items()}
-    return turns if rotary else slides
-
-
-def in_file(
-    names: Names, scales: Scales, ticks: Mapping[str, float], arm: Arm | None, *, degrees: tuple[bool, bool]
-) -> dict[str, str]:
-    """Return the unit that each column had in the file, by standard name.
-
-    Parameters
-    ----------
-    names, scales
-        Names of the columns in use, and their declared or stated factors to SI.
-    ticks : mapping
-        Seconds per unit of the time columns.
-    arm : Arm, optional
-        Arm of the log, for the kinds of its joints.
-    degrees : tuple of bool
-        Whether positions and velocities were recognised as degrees.
-    """
-    found: dict[str, str] = {}
-    turned = np.array([1.0 if _slides(arm, j) else _DEGREE for j in range(len(scales.q))])
-    q, dq = (turned if recognised else 1.0 for recognised in degrees)
-    groups = {
-        "q": scales.q * q,
-        "tau": scales.tau,
-        "dq": np.empty(0) if scales.dq is None else scales.dq * dq,
-        "q_ref": scales.q_ref * (q if len(scales.q_ref) else 1.0),
-        "dq_ref": np.empty(0) if scales.dq_ref is None else scales.dq_ref * dq,
-        "tau_meas": np.empty(0) if scales.tau_meas is None else scales.tau_meas,
-        "q_link": np.empty(0) if scales.q_link is None else scales.q_link * q,
-    }
-    for key, column in names.pairs:
-        group = key.rstrip("0123456789")
-        j = 0 if key in ticks else int(key[len(group) :]) - 1
-        factor = ticks[key] if key in ticks else float(groups[group][j])
-        found[key] = _named(group_of(key), factor, names.units.get(column), arm, j)
-    return found
-
-
-def _named(group: str, factor: float, spelt: str | None, arm: Arm | None, j: int) -> str:
-    """Return the unit of a column with a given factor to SI: as the file spells it, or the units possible for the joint."""
-    fits = [unit for unit, f in FACTORS[group].items() if math.isclose(f, factor) and _suits(group, unit, arm, j)]
-    fits = fits or [COUNTED.get(group, "")]
-    return spelt if spelt in fits else " or ".join(fits)
 
 
 def check(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None, declared: frozenset[str]) -> None:
@@ -376,7 +336,7 @@ def _counts(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None) ->
         if not _in_whole_numbers(arrays.q[:, j]):
             continue
         low, high = arrays.q[:, j].min(), arrays.q[:, j].max()
-        other = "--units q=mm if they are millimetres" if _slides(arm, j) else "--units q=deg if they are degrees"
+        other = "--units q=mm if they are millimetres" if slides(arm, j) else "--units q=deg if they are degrees"
         remedy = f"it looks like counts: add --units q=counts, or {other}"
         if arm is None or arm.encoder_step is None:
             remedy = f"for counts {_per_turn(arm, j)[1]}, and add --units q=counts; or add {other}"
@@ -394,8 +354,8 @@ def _velocity(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None) 
     if arrays.dq is None or names.dq is None:
         return
     for j, name in enumerate(names.dq):
-        low, high = _MILLI_RATIO if _slides(arm, j) else _DEGREE_RATIO
-        unit, group = ("mm", "mm/s") if _slides(arm, j) else ("deg", "deg/s")
+        low, high = _MILLI_RATIO if slides(arm, j) else _DEGREE_RATIO
+        unit, group = ("mm", "mm/s") if slides(arm, j) else ("deg", "deg/s")
         ratio = _speed_ratio(arrays, arm, j)
         if low <= ratio <= high:
             raise UnitError(
@@ -418,7 +378,7 @@ def _reference(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None)
     if arrays.q_ref is None:
         return
     for j, name in enumerate(names.q_ref):
-        low, high = _MILLI_RATIO if _slides(arm, j) else _DEGREE_RATIO
+        low, high = _MILLI_RATIO if slides(arm, j) else _DEGREE_RATIO
         wanted, moved = float(np.std(arrays.q_ref[:, j])), float(np.std(arrays.q[:, j]))
         ratio = wanted / moved if moved > 0 else 0.0
         if low <= ratio <= high or (ratio > 0 and low <= 1 / ratio <= high):
@@ -443,12 +403,12 @@ def _speed_ratio(arrays: Arrays, arm: Arm | None, j: int) -> float:
 def _position(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None) -> None:
     for j, name in enumerate(names.q):
         farthest, fastest, unit = _FARTHEST_RAD, _FASTEST_RAD_S, "deg"
-        if _slides(arm, j):
+        if slides(arm, j):
             farthest, fastest, unit = _FARTHEST_M, math.inf, "mm"
         travel, speed = _travel(arrays.q[:, j]), _peak_speed(arrays, arm, j)
-        counts = not _slides(arm, j) and _moves_in_counts(arrays, arm, j, _DEGREE)
+        counts = not slides(arm, j) and _moves_in_counts(arrays, arm, j, DEGREE)
         if travel > farthest or speed > fastest or counts:
-            si = "m" if _slides(arm, j) else "rad"
+            si = "m" if slides(arm, j) else "rad"
             why = f"moves over {travel:.4g} {si} at up to {speed:.4g} {si}/s"
             why += ", in steps of one encoder count in degrees" if counts else ""
             raise UnitError(
@@ -476,7 +436,7 @@ def _travel(q: NDArray[np.float64]) -> float:
 def _without_turns(arrays: Arrays, arm: Arm | None, j: int) -> NDArray[np.float64]:
     """Return positions of joint `j` without jumps of a wrapped encoder, by turns in radians or in degrees; lengths do not wrap."""
     q = arrays.q[:, j]
-    return q if _slides(arm, j) else unwrapped(unwrapped(q, TURN), 360.0)
+    return q if slides(arm, j) else unwrapped(unwrapped(q, TURN), 360.0)
 
 
 def _moves_in_counts(arrays: Arrays, arm: Arm | None, j: int, factor: float) -> bool:
@@ -509,6 +469,6 @@ def _torque(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None) ->
             )
 
 
-def _slides(arm: Arm | None, j: int) -> bool:
+def slides(arm: Arm | None, j: int) -> bool:
     """Whether joint `j` (from 0) is known to be linear."""
     return arm is not None and j < arm.n_joints and not arm.rotary_joints[j]

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from armgap.log.conversion.units import si
+from armgap.log.conversion.unit_names import si
 from armgap.log.log import COLUMNS
 from armgap.report.conventions import brief
 from armgap.report.forms.markdown import escape

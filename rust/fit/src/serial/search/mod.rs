@@ -12,9 +12,7 @@ use crate::locate::dependence::Dependence;
 use crate::locate::table_form::TableForm;
 use crate::progress::{Phase, ProgressReporter};
 use crate::serial::constants::ARM_WIDE_FINALISTS;
-use crate::serial::search::evidence::Evidence;
-use crate::serial::search::fitting::Fitted;
-use crate::serial::search::screening::Guess;
+use crate::serial::search::{evidence::Evidence, fitting::Fitted, screening::Guess};
 use crate::serial::term::Term;
 use crate::serial::term::table::Table;
 use crate::serial::weak_form::rows::{Prior, Regression, Rows, Signal};
@@ -41,13 +39,13 @@ pub struct Search<'a> {
     pub holdout: &'a dyn Motion,
     /// Prior of the arm's parameters: the arm file's values and standard deviations.
     pub prior: &'a Prior,
-    /// Candidate terms at their initial guesses; one group holds the guesses of one effect on one joint or pair of joints, or on the whole arm.
+    /// Candidate terms at their initial guesses; a group holds those of one effect on one joint or pair of joints, or on the whole arm.
     pub candidates: Vec<Vec<Term>>,
     /// Whether each joint is rotary; a joint that is not is linear.
     pub rotary: Vec<bool>,
     /// Encoder step of each joint, rad or m; empty where the steps are unknown.
     pub steps: Vec<f64>,
-    /// Sample period, s. A delay or lag below it is an artefact of how torques and positions were sampled, and is not named.
+    /// Sample period, s: a shorter delay or lag is an artefact of sampling, and is not named.
     pub period: f64,
     /// Function that tells whether the inertia matrix along the logs, at given parameters of the arm and without the rotors of given joints (from 0),
     /// is conditioned well enough for simulation (`CONDITIONED`).
