@@ -42,6 +42,9 @@ const FEWEST_ROWS: usize = 5;
 /// Part of a joint's travel next to either limit in which a torque towards the middle is that of a stop.
 const STOP_PART: f64 = 0.02;
 
+/// Part of a joint's rows, in all logs, in which the motion may need more torque than in an event for the event to be that of a limit.
+const LIMITED_PART: f64 = 0.01;
+
 /// Part of a raised cosine that residuals have to cover.
 const COVERED_PART: f64 = 0.5;
 
@@ -102,6 +105,8 @@ pub struct Residuals {
     pub joints: Vec<Vec<Option<f64>>>,
     /// Positions by joint and time, rad or m.
     pub positions: Vec<Vec<f64>>,
+    /// Torque that the model needs for the motion by joint and time, N m or N: the logged torque less the residual; `None` where the joint has no row.
+    pub needed: Vec<Vec<Option<f64>>>,
 }
 
 /// Residuals, log by log, of an equation's rows with the residuals `of_rows` by joint and row, N m or N.
@@ -111,19 +116,26 @@ pub fn residuals<const N: usize, const P: usize>(
 ) -> Vec<Residuals> {
     let logs = equation.functions.iter().map(|phi| phi.log + 1).max().unwrap_or(0);
     let mut at = vec![0; equation.functions.len()];
-    let none = Residuals { times: Vec::new(), joints: vec![Vec::new(); N], positions: vec![Vec::new(); N] };
+    let none = Residuals {
+        times: Vec::new(),
+        joints: vec![Vec::new(); N],
+        positions: vec![Vec::new(); N],
+        needed: vec![Vec::new(); N],
+    };
     let mut found: Vec<Residuals> = vec![none; logs];
     for (i, phi) in equation.functions.iter().enumerate() {
         let log = &mut found[phi.log];
         at[i] = log.times.len();
         log.times.push(phi.centre);
-        log.joints.iter_mut().for_each(|joint| joint.push(None));
+        log.joints.iter_mut().chain(&mut log.needed).for_each(|joint| joint.push(None));
         let middle = &equation.logs[phi.log].middles[usize::midpoint(phi.first, phi.last)];
         log.positions.iter_mut().zip(middle.q).for_each(|(joint, q)| joint.push(q));
     }
     for (j, (kept, values)) in equation.kept.iter().zip(of_rows).enumerate() {
-        for (i, value) in kept.iter().zip(values) {
-            found[equation.functions[*i].log].joints[j][at[*i]] = Some(*value);
+        for ((i, value), torque) in kept.iter().zip(values).zip(&equation.rows.joints[j].y) {
+            let log = &mut found[equation.functions[*i].log];
+            log.joints[j][at[*i]] = Some(*value);
+            log.needed[j][at[*i]] = Some(torque - value);
         }
     }
     found
@@ -149,11 +161,30 @@ pub fn pushes(logs: &[Residuals], coulomb: &[f64]) -> Vec<Event> {
     for event in events[..=last].iter().map(probable) {
         // Lengths of neighbouring events may become those of one push.
         let is_new = !found.iter().any(|other| other.overlaps(&event));
-        if is_new && matters(&event) && is_inside(&logs[event.log], &event) && !is_of_a_stop(logs, &event) {
+        let is_known = is_of_a_stop(logs, &event) || is_of_a_limit(logs, &event);
+        if is_new && matters(&event) && is_inside(&logs[event.log], &event) && !is_known {
             found.push(event);
         }
     }
     found
+}
+
+/// Whether an event is what a limit of the drive does: on the joint on which it stands out most it takes from the command, and the motion hardly ever needs
+/// more torque in this direction than it gets then.
+fn is_of_a_limit(logs: &[Residuals], event: &Event) -> bool {
+    let Some((joint, height, scale)) = event.strongest() else { return false };
+    let direction = height.signum();
+    let log = &logs[event.log];
+    let is_within = |t: f64| (t - event.time).abs() < 0.5 * event.half;
+    let within = log.times.iter().zip(&log.needed[joint]).filter(|(t, _)| is_within(**t));
+    let most =
+        within.filter_map(|(_, needed)| *needed).map(|x| direction * x).fold(f64::NEG_INFINITY, f64::max);
+    let (mut rows, mut more) = (0.0, 0.0);
+    for needed in logs.iter().flat_map(|log| log.needed[joint].iter().flatten()) {
+        rows += 1.0;
+        more += f64::from(u8::from(direction * needed > most + scale));
+    }
+    most > 0.0 && more <= LIMITED_PART * rows
 }
 
 /// Whether an event lies inside its log: what happens at its begin or end may be a state of the arm that the log does not hold.
@@ -342,7 +373,9 @@ mod tests {
         };
         let joints = (0..JOINTS).map(|j| joint(j, &mut random)).collect();
         let positions = vec![times.iter().map(|t| (0.9 * t).sin()).collect(); JOINTS];
-        Residuals { times, joints, positions }
+        // The motion needs torques of up to 5 N m.
+        let needed = vec![times.iter().map(|t| Some(5.0 * (0.9 * t).cos())).collect(); JOINTS];
+        Residuals { times, joints, positions, needed }
     }
 
     fn pulse(t: f64, centre: f64, half: f64) -> f64 {
@@ -399,6 +432,17 @@ mod tests {
         let stop = |sign: f64| move |j: usize, t: f64| if j == 0 { sign * pulse(t, lower, 0.2) } else { 0.0 };
         assert!(pushes(&[log(1, 0.0, stop(-2.0))], &[1.0; JOINTS]).is_empty());
         assert_eq!(pushes(&[log(1, 0.0, stop(2.0))], &[1.0; JOINTS]).len(), 1);
+    }
+
+    #[test]
+    fn torque_that_a_limit_takes_is_no_push() {
+        // After one period the motion needs its largest torque, and after two fifths of one far less.
+        let period = 2.0 * PI / 0.9;
+        let taken =
+            |at: f64, sign: f64| move |j: usize, t: f64| if j == 0 { sign * pulse(t, at, 0.2) } else { 0.0 };
+        assert!(pushes(&[log(1, 0.0, taken(period, 2.0))], &[1.0; JOINTS]).is_empty());
+        assert_eq!(pushes(&[log(1, 0.0, taken(period, -2.0))], &[1.0; JOINTS]).len(), 1);
+        assert_eq!(pushes(&[log(1, 0.0, taken(0.4 * period, 2.0))], &[1.0; JOINTS]).len(), 1);
     }
 
     #[test]
