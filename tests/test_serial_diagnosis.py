@@ -124,6 +124,7 @@ def test_the_nominal_arm_has_no_cause(quiet: list[Log], arm: Arm) -> None:
     assert result.verdict in ("none", "parameters")
     assert not result.causes
     assert not result.candidates
+    assert result.gap.unexplained == 0.0
 
 
 def test_friction_of_one_joint_is_named_with_its_size(found: Diagnosis) -> None:
@@ -276,10 +277,25 @@ def test_the_same_seed_gives_the_same_result(found: Diagnosis, sticky: list[Log]
     assert once == twice
 
 
-def test_what_was_not_tested_is_undecided(found: Diagnosis) -> None:
-    untested = {(r.effect, r.joint): r for r in found.ruled_out if r.effect == "external_pulse"}
-    assert len(untested) == 3
-    assert {(r.status, r.why) for r in untested.values()} == {("undecided", "not tested on serial arms from such logs")}
+def test_pushes_that_do_not_stand_out_are_absent(found: Diagnosis) -> None:
+    looked_for = {(r.effect, r.joint): r for r in found.ruled_out if r.effect == "external_pulse"}
+    assert len(looked_for) == 3
+    why = "no push stands out of what the model lacks in any of these logs"
+    assert {(r.status, r.why) for r in looked_for.values()} == {("absent", why)}
+
+
+def test_a_push_is_named_with_its_log(arm: Arm) -> None:
+    push = Effect("external_pulse", 2, {"impulse": 1.2, "time": 4.0, "duration": 0.2})
+
+    def log(number: int, *effects: Effect) -> Log:
+        t, tau = torques(number, SECONDS)
+        return simulate(arm, t, tau, effects=effects, noise=1e-4, seed=number, tolerance=1e-8, name=f"log-{number}")
+
+    result = asked([log(21, push), log(0), log(1)], arm)
+    [cause] = result.causes
+    assert (cause.effect, cause.joint, cause.log) == ("external_pulse", 2, "log-21")
+    assert cause.parameters["impulse"].value == pytest.approx(1.2, rel=0.2)
+    assert cause.parameters["time"].value == pytest.approx(4.0, abs=0.05)
 
 
 def test_transmissions_are_tested_on_every_joint(found: Diagnosis) -> None:

@@ -242,7 +242,9 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             // Pushes were looked for beside all causes that were found.
             let error = |fit: &Fit<P>| self.holdout_error(&last.weights, &fit.hypothesis);
             let left = (error(&model) / error(&attribution.refit)).min(1.0);
-            disturbances.iter_mut().for_each(|push| push.doubt_beside(left));
+            for push in &mut disturbances {
+                push.doubt_beside(left);
+            }
         }
         // Whether a gap is open is the search's answer, whose model may hold effects that are not named.
         let asked = (open || changed) && !causes.is_empty();

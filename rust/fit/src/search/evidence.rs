@@ -192,7 +192,9 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             let effects: Vec<EffectInstance> = effects;
             if let Some(rival) = self.rival_cost(&taken_out, &effects, &besides, &last.weights) {
                 let left = (rival - full + rest) / rest;
-                set.iter().for_each(|i| causes[*i].evidence.leave_at_most(left));
+                for i in set {
+                    causes[i].evidence.leave_at_most(left);
+                }
             }
         }
         for cause in causes.iter_mut().filter(|cause| cause.ground == Ground::Motion) {

@@ -169,7 +169,9 @@ impl Request<'_> {
                 }
                 _ => true,
             };
-            candidates.iter_mut().for_each(|group| group.retain(is_possible));
+            for group in &mut candidates {
+                group.retain(is_possible);
+            }
         }
         if self.options.half_width.is_some() {
             candidates.retain(|group| !constants::ROUNDED_BY_LOW_PASS.contains(&group[0].name()));

@@ -448,7 +448,7 @@ mod tests {
     #[test]
     fn an_outlier_of_one_row_is_no_push() {
         let mut given = log(1, 0.0, |_, _| 0.0);
-        let alone = |k: usize| k % 8 == 0;
+        let alone = |k: usize| k.is_multiple_of(8);
         given.joints[0].iter_mut().enumerate().filter(|(k, _)| !alone(*k)).for_each(|(_, r)| *r = None);
         given.joints[0][400] = Some(30.0);
         assert!(pushes(&[given], &[0.1; JOINTS]).is_empty());

@@ -97,9 +97,7 @@ pub(crate) fn assemble<const N: usize, const P: usize>(
         && !hidden.is_empty()
         && !is_improved(if others.is_empty() { &refit_missed } else { &missed_beside }, &missed(2), &floor);
     let (mut named, candidates) = causes(found, [contradicted, unconfirmed], &rotary, commanded);
-    let tracks: Vec<&str> =
-        training.data.tracks.iter().chain(&holdout.data.tracks).map(|track| track.name.as_str()).collect();
-    named.extend(events.iter().flat_map(|event| pushes_of(event, tracks[event.log], &rotary)));
+    named.extend(pushes(events, [training, holdout], &rotary));
     let none_stays = contradicted || unconfirmed && others.is_empty();
     let reported = if none_stays { &found.refit_feasible } else { &found.reported };
     if none_stays {
@@ -129,12 +127,9 @@ pub(crate) fn assemble<const N: usize, const P: usize>(
     };
     let (verdict, remains) = (evidence.verdict(), evidence.remains());
     let parameters = |theta: &[f64], sigma: &[f64]| values(description, theta, sigma);
-    let looked_for = commanded.is_none() && options.max_causes > 0;
-    let pushed: Option<Vec<usize>> =
-        looked_for.then(|| events.iter().flat_map(|event| event.heights.iter().map(|h| h.0 + 1)).collect());
+    let pushed = (commanded.is_none() && options.max_causes > 0).then(|| pushed_joints(events));
     let sanity = sanity(description, &reported.estimate.theta, &found.sigma[1]);
     let (free_run_series, free_run) = free_runs(&compared, data);
-    gap.free_run = free_run;
     let mut notes = notes(found, training, holdout, &rotary);
     notes.extend(regularised(widths));
     notes.extend(sanity_note(&sanity));
@@ -171,7 +166,7 @@ pub(crate) fn assemble<const N: usize, const P: usize>(
         version: env!("CARGO_PKG_VERSION"),
         seconds: 0.0,
         notes,
-        gap,
+        gap: Gap { free_run, ..gap },
     }
 }
 
@@ -245,6 +240,21 @@ fn model_of<const N: usize, const P: usize>(
     Model::new(arm, std::array::from_fn(|i| theta[i]), terms).behind(closed_loop)
 }
 
+/// Pushes of all events as causes, in logs of which those of the holdout count on from the training logs.
+fn pushes<const N: usize, const P: usize>(
+    events: &[Event],
+    sets: [&Set<N, P>; 2],
+    rotary: &[bool],
+) -> Vec<Cause> {
+    let tracks: Vec<_> = sets.into_iter().flat_map(|set| &set.data.tracks).collect();
+    events.iter().flat_map(|event| pushes_of(event, &tracks[event.log].name, rotary)).collect()
+}
+
+/// Joints, from 1, that events act on.
+fn pushed_joints(events: &[Event]) -> Vec<usize> {
+    events.iter().flat_map(|event| event.heights.iter().map(|height| height.0 + 1)).collect()
+}
+
 /// Predictions of the model with index `i` of those that a report compares: only the one with the named causes knows of pushes.
 fn predictions<const N: usize, const P: usize>(
     models: &[Model<N, P>; 3],
@@ -295,13 +305,15 @@ fn gap<const N: usize, const P: usize>(
         |i: usize| rms::<N>(&compared.measured, &limited(&compared.measured, &compared.predicted[i]));
     let [before, refit, after] = [0, 1, 2].map(missed);
     let floor = compared.floor.clone();
+    let motion = rms::<N>(&compared.measured, &still(data));
+    let remains = stands_out(&after, &floor, &motion, CONSEQUENTIAL_SERIAL_ERROR);
     Gap {
         horizon_s: options.horizon,
         unit: if rotary.first() == Some(&true) { "rad" } else { "m" },
         closed: closed(&before, &after, &floor),
         closed_ci: closed_interval(compared, data, options.seed),
-        unexplained: (1.0 - closed(&refit, &after, &floor)).clamp(0.0, 1.0),
-        motion: rms::<N>(&compared.measured, &still(data)),
+        unexplained: if remains { (1.0 - closed(&refit, &after, &floor)).clamp(0.0, 1.0) } else { 0.0 },
+        motion,
         horizons: HORIZONS.iter().filter_map(|h| at_horizon(compared, data, *h)).collect(),
         free_run: FreeRun { before: Vec::new(), after: Vec::new() },
         second_halves: None,
