@@ -239,9 +239,10 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         if !candidates.is_empty()
             && let Some(last) = attribution.nodes.last()
         {
-            // Pushes were looked for beside all causes that were found.
+            // Pushes were looked for beside all causes that were found: what only the unnamed of these explain is left now.
             let error = |fit: &Fit<P>| self.holdout_error(&last.weights, &fit.hypothesis);
-            let left = (error(&model) / error(&attribution.refit)).min(1.0);
+            let left = (error(&model) - error(&attribution.model)) / error(&attribution.refit);
+            let left = if left > 0.0 { left.min(1.0) } else { 0.0 };
             for push in &mut disturbances {
                 push.doubt_beside(left);
             }

@@ -186,14 +186,14 @@ impl Request<'_> {
             candidates.extend(controller_settings(controller, &inertia, period));
         }
         let mut found = self.searched(&training, &holdout, &prior, &candidates, &progress);
-        let mut events = Vec::new();
+        let mut events: Vec<Event> = Vec::new();
         for _ in 0..PUSH_ROUNDS {
             if controller.is_some() || self.options.max_causes == 0 {
                 break;
             }
             let mut new = pushed(&training, &holdout, &found);
             // Next to a push stays what a raised cosine does not give of it.
-            new.retain(|event| !events.iter().any(|known: &Event| known.overlaps(event)));
+            new.retain(|event| !events.iter().any(|known| known.overlaps(event)));
             if new.is_empty() {
                 break;
             }
@@ -205,7 +205,7 @@ impl Request<'_> {
             found = self.searched(&training, &holdout, &prior, &candidates, &progress);
             events.extend(new);
         }
-        add_pushes(&mut training, &mut holdout, &events);
+        add_pushes(&mut training, &mut holdout, &mut events);
         let mut diagnosis = result::assemble(
             self.arm,
             &arm,
@@ -311,18 +311,18 @@ fn pushed<const N: usize, const P: usize>(
     pushes::pushes(&logs, &model.estimate.theta[P - N..P])
 }
 
-/// Adds the pushes of events to the logs, for predictions.
+/// Adds the pushes of events to the logs, for predictions; times become those of the logs.
 fn add_pushes<const N: usize, const P: usize>(
     training: &mut Set<N, P>,
     holdout: &mut Set<N, P>,
-    events: &[Event],
+    events: &mut [Event],
 ) {
     let tracks = training.data.tracks.iter_mut().chain(&mut holdout.data.tracks);
     for (log, track) in tracks.enumerate() {
         let begin = track.t.first().copied().unwrap_or(0.0);
-        for (push, _) in events.iter().filter(|event| event.log == log).flat_map(Event::pushes) {
-            let [impulse, time, duration] = push.p;
-            track.pushes.push(EffectInstance { p: [impulse, begin + time, duration], ..push });
+        for event in events.iter_mut().filter(|event| event.log == log) {
+            event.time += begin;
+            track.pushes.extend(event.pushes().into_iter().map(|(push, _)| push));
         }
     }
 }

@@ -56,7 +56,7 @@ const NORMAL_FROM_MEDIAN: f64 = 1.4826;
 pub struct Event {
     /// Index of the log.
     pub log: usize,
-    /// Time of the largest torque since the start of the log, s.
+    /// Time of the largest torque, s: since the start of the log, and in results on the log's clock.
     pub time: f64,
     /// Half length, s.
     pub half: f64,
@@ -114,7 +114,6 @@ pub fn residuals<const N: usize, const P: usize>(
     equation: &Equation<N, P>,
     of_rows: &[Vec<f64>],
 ) -> Vec<Residuals> {
-    let logs = equation.functions.iter().map(|phi| phi.log + 1).max().unwrap_or(0);
     let mut at = vec![0; equation.functions.len()];
     let none = Residuals {
         times: Vec::new(),
@@ -122,7 +121,7 @@ pub fn residuals<const N: usize, const P: usize>(
         positions: vec![Vec::new(); N],
         needed: vec![Vec::new(); N],
     };
-    let mut found: Vec<Residuals> = vec![none; logs];
+    let mut found: Vec<Residuals> = vec![none; equation.logs.len()];
     for (i, phi) in equation.functions.iter().enumerate() {
         let log = &mut found[phi.log];
         at[i] = log.times.len();
