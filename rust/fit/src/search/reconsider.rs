@@ -10,7 +10,7 @@
 use crate::likelihood::context::DiagnosisContext;
 use crate::likelihood::solve::Effort;
 use crate::model::hypothesis::{EffectInstance, Hypothesis};
-use crate::search::acceptance::{ABOVE_FLOOR, Ground, MATTERS, is_possible};
+use crate::search::acceptance::{ABOVE_FLOOR, Ground, MATTERS, TRUST_GAIN, is_possible};
 use crate::search::attribute::{Candidate, SearchNode};
 use crate::search::belief::{Cause, name, probability_over};
 use crate::search::model_search::{ModelSearch, added};
@@ -199,9 +199,10 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     }
 }
 
-/// Whether the prediction error of one candidate is hardly larger than that of another.
+/// Whether the prediction error of one candidate is hardly larger than that of another, and its parameters are hardly further from their prior values:
+/// what predicts as well with parameters that the arm cannot have is no explanation.
 fn as_well<const P: usize>(one: &Candidate<P>, other: &Candidate<P>) -> bool {
-    one.error < AS_WELL.powi(2) * other.error
+    one.error < AS_WELL.powi(2) * other.error && one.fit.prior_cost - other.fit.prior_cost < TRUST_GAIN
 }
 
 /// Share of the gap that a rival must have removed at the search node where a cause was added that removed the share `of_cause`. What a cause of more
@@ -213,6 +214,25 @@ fn least_share(fewer: bool, of_cause: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::likelihood::covariance::ParameterCovariance;
+    use crate::likelihood::solve::Fit;
+    use nalgebra::DMatrix;
+
+    #[test]
+    fn what_predicts_as_well_with_impossible_parameters_does_not_do_as_well() {
+        let of = |error: f64, prior_cost: f64| {
+            let covariance =
+                ParameterCovariance { matrix: DMatrix::zeros(4, 4), degrees_of_freedom: vec![9.0; 4] };
+            let hypothesis = Hypothesis::rigid([1.0; 4]);
+            let fit = Fit { hypothesis, data_cost: 0.0, prior_cost, covariance, costs: Vec::new() };
+            Candidate { effect: None, size: 0.0, fit, training: Vec::new(), holdout: Vec::new(), error }
+        };
+        assert!(as_well(&of(1.05, 4.0), &of(1.0, 3.0)));
+        assert!(!as_well(&of(1.2, 4.0), &of(1.0, 3.0)));
+        // A gain predicts as well as a payload, with parameters 37 standard deviations off the arm file.
+        assert!(!as_well(&of(1.0, 1360.0), &of(1.0, 3.0)));
+        assert!(as_well(&of(1.0, 3.0), &of(1.0, 1360.0)));
+    }
 
     #[test]
     fn a_rival_of_fewer_values_needs_no_half_of_what_its_cause_removed() {
