@@ -6,7 +6,7 @@
 use crate::likelihood::holdout::CONSEQUENTIAL_ERROR;
 use crate::likelihood::holdout::is_plausible;
 use crate::model::hypothesis::EffectInstance;
-use crate::search::attribute::{Candidate, SearchNode};
+use crate::search::attribute::{Candidate, SearchNode, commoner_than_first};
 use armgap_core::effect::{MAX_PARAMETERS, Quantity};
 
 /// Least mean decrease of the windows' cost by an effect of three values, the most that effects have, in standard errors of this mean, for the effect to be
@@ -130,9 +130,23 @@ impl<const N: usize, const P: usize> SearchNode<N, P> {
     /// Whether candidates `best` and `other` are look-alikes: the cost of `other` is higher by only a small part of the decrease that `best` brings,
     /// or by less than one standard error over the windows.
     pub fn is_alike(&self, best: &Candidate<P>, other: &Candidate<P>) -> bool {
+        (self.costs_as_much(best, other) && !self.excludes(best, other)) || best.z_over(other) < 1.0
+    }
+
+    /// Whether the cost of candidate `other` is higher than that of candidate `best` by only a small part of the decrease that `best` brings.
+    fn costs_as_much(&self, best: &Candidate<P>, other: &Candidate<P>) -> bool {
         let advantage = self.base.score() - best.score();
-        let is_near = other.score() - best.score() < (LOOK_ALIKE * advantage).max(3.0);
-        (is_near && !self.excludes(best, other)) || best.z_over(other) < 1.0
+        other.score() - best.score() < (LOOK_ALIKE * advantage).max(3.0)
+    }
+
+    /// The node with an effect in first place that no motion distinguishes from its best candidate's and that is the commoner one, if it was fitted as
+    /// well: which of the two costs less is a matter of rounding, and would change with the horizon.
+    pub(crate) fn with_commoner_first(mut self) -> Self {
+        let place = commoner_than_first(&self.candidates, N);
+        if let Some(place) = place.filter(|i| self.costs_as_much(&self.candidates[0], &self.candidates[*i])) {
+            self.candidates[..=place].rotate_right(1);
+        }
+        self
     }
 
     /// Whether candidate `best` shows that candidate `other` is not the cause: it leaves no more than noise, and `other` significantly more, on the mean of

@@ -9,6 +9,7 @@ use crate::likelihood::solve::{Effort, Fit};
 use crate::model::hypothesis::{EffectInstance, Hypothesis};
 use crate::progress::Phase;
 use crate::search::acceptance::{ABOVE_FLOOR, UNEXPLAINED};
+use crate::search::rivals::equivalent;
 use armgap_core::arm::Arm;
 use armgap_core::effect::Trial;
 use armgap_core::transmission::Sides;
@@ -112,7 +113,8 @@ pub struct SearchNode<const N: usize, const P: usize> {
     pub settled: Fit<P>,
     /// The current model, fitted under the weights common to all candidates.
     pub base: Candidate<P>,
-    /// Alternatives to the current model that were fitted to the end, lowest cost first.
+    /// Alternatives to the current model that were fitted to the end, lowest cost first, but for pairs that no motion distinguishes
+    /// ([`SearchNode::with_commoner_first`]).
     pub candidates: Vec<Candidate<P>>,
     /// Every candidate effect that was fitted, lowest cost first, with the share of the gap that it removes under the current model's own window
     /// weights.
@@ -233,6 +235,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let motion = self.motion(&weights);
         let settled = fit;
         self.duel(SearchNode { settled, base, candidates, field, screened, traces, weights, floor, motion })
+            .with_commoner_first()
     }
 
     /// Deviation of an effect's first parameter from its neutral value, relative to the largest deviation that a fit allows.
@@ -372,6 +375,17 @@ fn ranked<const P: usize>(mut candidates: Vec<Candidate<P>>) -> Vec<Candidate<P>
     best
 }
 
+/// Index of the candidate whose effect no motion distinguishes from that of the first one and is the commoner of the two; none if there is none.
+pub(crate) fn commoner_than_first<const P: usize>(
+    candidates: &[Candidate<P>],
+    joints: usize,
+) -> Option<usize> {
+    let first = candidates.first()?.effect?;
+    let is_commoner =
+        |c: &Candidate<P>| c.effect.is_some_and(|effect| equivalent::is_commoner(&effect, &first, joints));
+    candidates.iter().position(is_commoner)
+}
+
 /// Hypotheses to be fitted to the end: those of the candidates of lowest cost, the first in any case and the others if below the cost `hopeless`, and
 /// those of the candidates of lowest prior cost.
 fn finalists<const P: usize>(candidates: &[Candidate<P>], hopeless: f64) -> Vec<Hypothesis<P>> {
@@ -425,6 +439,16 @@ mod tests {
             .map(|c| (c.effect.expect("an effect").law.spec().name, c.score()))
             .collect();
         assert_eq!(found, [("stribeck", 5.0), ("torque_gain", 6.0), ("quadratic_drag", 10.0)]);
+    }
+
+    #[test]
+    fn of_two_effects_that_no_motion_distinguishes_the_commoner_is_found() {
+        let of = |name: &str, cost: f64| candidate(name, 0.5, &[cost], &[0.0]);
+        let pair = [of("coulomb_asymmetry", 1.0), of("stribeck", 1.5), of("torque_offset", 2.0)];
+        assert_eq!(commoner_than_first(&pair, 2), Some(2));
+        assert_eq!(commoner_than_first(&[of("torque_offset", 1.0), of("coulomb_asymmetry", 2.0)], 2), None);
+        assert_eq!(commoner_than_first(&[of("stribeck", 1.0), of("torque_offset", 2.0)], 2), None);
+        assert_eq!(commoner_than_first::<4>(&[], 2), None);
     }
 
     #[test]

@@ -70,6 +70,15 @@ pub fn are(a: &EffectInstance, b: &EffectInstance, joints: usize) -> bool {
     a.same_place(b) || among(a, b) || among(b, a)
 }
 
+/// Pairs of effects that no motion distinguishes at any values of the arm's parameters, the commoner one first: readings of current and position have
+/// zero errors more often than friction differs by direction, or a base is out of level.
+const COMMONER: [(&str, &str); 2] = [("torque_offset", "coulomb_asymmetry"), ("encoder_offset", "base_tilt")];
+
+/// Whether `a` gives the same motion as `b` with the arm's parameters as they are, on an arm with `joints` joints, and is the commoner of the two.
+pub fn is_commoner(a: &EffectInstance, b: &EffectInstance, joints: usize) -> bool {
+    COMMONER.contains(&(a.law.spec().name, b.law.spec().name)) && are(a, b, joints)
+}
+
 /// Effects that cannot be distinguished from `effect`: those known to give the same motion, then the look-alikes found in the logs, none twice. `moved`
 /// returns the parameters of the arm at whose other values a look-alike needs the torques of `effect` in every state, `None` if it does not.
 pub fn all(
@@ -124,6 +133,13 @@ mod tests {
         }
         assert!(are(&placed("torque_gain", 0), &placed("torque_gain", 1), 2));
         assert!(on_same_joints("torque_offset", "coulomb_asymmetry").is_some());
+        assert!(is_commoner(&placed("torque_offset", 1), &placed("coulomb_asymmetry", 1), 2));
+        assert!(!is_commoner(&placed("coulomb_asymmetry", 1), &placed("torque_offset", 1), 2));
+        assert!(!is_commoner(&placed("torque_offset", 1), &placed("coulomb_asymmetry", 0), 2));
+        assert!(
+            !is_commoner(&placed("encoder_offset", 1), &placed("base_tilt", 0), 2),
+            "joint 2 has its own zero"
+        );
         assert!(on_same_joints("torque_offset", "joint_spring").is_none());
         let found = [placed("hardening_spring", 0), placed("torque_ripple", 0), placed("payload", 0)];
         let moved = |other: &EffectInstance| match other.law.spec().name {
