@@ -67,7 +67,7 @@ impl WithArm for Request<'_> {
         if let Some(instead) = instead {
             (context, conclusion) = instead;
         }
-        let headline = context.headline(conclusion, max_causes);
+        let headline = context.headline(conclusion, max_causes, &self.options.withheld);
         let in_training = if is_crosswise { None } else { left_in_training(&context, &headline, seed) };
         let attribution = &headline.attribution;
         let open = context.open_candidates(&attribution.model.hypothesis).len();

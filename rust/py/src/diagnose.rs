@@ -4,7 +4,7 @@ use crate::convert::{description, matrix, serial_arm, vector};
 use crate::progress::with_progress;
 use armgap_fit::diagnose::diagnose as run;
 use armgap_fit::identify::refit::refit as rigid_fit;
-use armgap_fit::log::input::{LogData, Options};
+use armgap_fit::log::input::{LogData, Options, Withheld};
 use armgap_fit::model::arm::ArmDescription;
 use armgap_fit::result::report::schema;
 use armgap_fit::serial::{SerialArm, diagnose as run_serial};
@@ -113,6 +113,11 @@ pub fn diagnose(
     }
     if let Some(value) = options.get_item("seed")? {
         chosen.seed = value.extract()?;
+    }
+    if let Some(value) = options.get_item("withheld")? {
+        let withheld: Vec<(String, Option<usize>, String)> = value.extract()?;
+        let of = |(effect, joint, why)| Withheld { effect, joint, why };
+        chosen.withheld = withheld.into_iter().map(of).collect();
     }
     let result = with_progress(py, progress.as_ref(), move |observer| {
         let (training, holdout) = (views(&training), views(&holdout));

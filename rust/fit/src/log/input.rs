@@ -45,6 +45,19 @@ pub struct Options {
     /// Parameters of the arm from which it is also fitted, SI; where the arm file's values are far off, the fit from these may have the smaller
     /// prediction errors.
     pub start: Option<Vec<f64>>,
+    /// Effects that are not to be named; no serial arm's result heeds them.
+    pub withheld: Vec<Withheld>,
+}
+
+/// An effect, or the pushes on a joint, that a diagnosis lists among its candidates and does not name: something beside the model explains it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Withheld {
+    /// Name of the effect in the library.
+    pub effect: String,
+    /// 1-based joint; none for effects of the whole arm.
+    pub joint: Option<usize>,
+    /// Reason, in words.
+    pub why: String,
 }
 
 impl Default for Options {
@@ -57,6 +70,7 @@ impl Default for Options {
             known_units: true,
             custom_effects: Vec::new(),
             start: None,
+            withheld: Vec::new(),
         }
     }
 }

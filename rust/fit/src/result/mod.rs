@@ -4,6 +4,7 @@
 //! * `floor`: noise floor of a gap, the prediction error that a perfect model would have.
 //! * `gap`: prediction errors and their resampled intervals.
 //! * `headline`: choice of the causes that a diagnosis names.
+//! * `nameable`: whether what was found may be named, and why not.
 //! * `report`: types of the result (`armgap.diagnosis/1`), which are its JSON Schema.
 //! * `ruled_out`: status of every effect that was looked for and not found.
 //! * `sanity`: checks of re-estimated parameters against what the arm file allows.
@@ -14,6 +15,7 @@ pub mod assemble;
 mod floor;
 pub(crate) mod gap;
 pub(crate) mod headline;
+pub(crate) mod nameable;
 pub mod report;
 pub(crate) mod ruled_out;
 pub(crate) mod sanity;

@@ -12,7 +12,7 @@ use crate::likelihood::solve::{Effort, Fit, neutral};
 use crate::model::hypothesis::EffectInstance;
 use crate::search::acceptance::{ABOVE_FLOOR, Ground, UNEXPLAINED};
 use crate::search::attribute::SearchNode;
-use crate::search::belief::Cause;
+use crate::search::belief::{Cause, belief_beside, left_over};
 use crate::search::model_search::Attribution;
 use armgap_core::arm::Arm;
 use armgap_core::effect::{Scope, Trial};
@@ -130,6 +130,11 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let Attribution { model, on_holdout, without, causes, nodes, .. } = attribution;
         let Some(last) = nodes.last() else { return };
         self.weigh_in(&Weighed { last, model, on_holdout, without }, causes);
+        // What is left unexplained moves the parameters too, whose return to their prior values is all that speaks for these.
+        let belief = belief_beside(left_over(nodes), 0.0);
+        for cause in causes.iter_mut().filter(|cause| cause.ground == Ground::Trust) {
+            cause.probability = belief * cause.evidence.selected;
+        }
     }
 
     /// Computes strength, evidence and probability of causes in a model that has them.
