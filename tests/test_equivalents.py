@@ -7,10 +7,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from armgap import Log
+from armgap import Arm, Log
 from armgap.check import Check
-from armgap.diagnosis.equivalents import encoder_scale, low_pass, speed_limit, torque_loop
-from armgap.report.pushes import times_of_pushes
+from armgap.diagnosis.equivalents import (
+    center_of_mass,
+    common_gain,
+    encoder_scale,
+    gear_losses,
+    low_pass,
+    torque_loop,
+)
 
 
 def test_a_lag_beside_a_low_pass_may_be_the_low_pass() -> None:
@@ -62,27 +68,61 @@ def test_an_eccentricity_over_a_short_travel_may_be_a_wrong_scale() -> None:
     assert (of(0.7), of(3.0), of(0.0)) == (["encoder_scale"], [], [])
 
 
-def test_pushes_where_a_drive_is_at_its_strongest_may_be_its_limit() -> None:
-    t = 0.002 * np.arange(4000)
-    q, tau = np.sin(2 * np.pi * 0.25 * t), np.where((t > 3.9) & (t < 4.1), 5.0, 0.1)
-    log = Log("run", t, q[:, None], tau[:, None], None)
+def test_an_encoder_offset_of_the_last_joint_may_be_a_centre_of_mass_beside_the_axis() -> None:
+    def said(joint: int, arm: Arm) -> list[str]:
+        data: dict[str, Any] = {"causes": [{"effect": "encoder_offset", "joint": joint, "equivalents": []}]}
+        center_of_mass(data, arm)
+        return [entry["effect"] for entry in data["causes"][0]["equivalents"]]
 
-    def pushed(time: float, impulse: float) -> dict[str, Any]:
-        values = {"time": time, "duration": 0.1, "impulse": impulse}
-        parameters = {name: {"value": value} for name, value in values.items()}
-        return {
-            "effect": "external_pulse", "joint": 1, "log": "run", "probability": 0.9, "equivalents": [], "parameters": parameters,
-        }  # fmt: skip
+    theta = [2.35, 0.084, 0.1, 38.5, 1.8, 2.3, 0.2, 7.2, 1.7]
+    two = Arm("two", "two-link", 9.81, 0.002, theta, sigma=np.full(9, 0.1))
+    axis = Arm("axis", "axis", 0.0, 0.002, [5.0, 0.0, 3.0, 10.0], sigma=np.full(4, 0.1))
+    assert (said(1, two), said(2, two), said(1, axis)) == ([], ["center_of_mass"], [])
 
-    for time, impulse, said in ((4.0, -0.2, True), (4.0, 0.2, False), (1.0, -0.2, False)):
-        data = {"causes": [pushed(time, impulse)]}
-        speed_limit(data, [log])
-        assert [e["effect"] for e in data["causes"][0]["equivalents"]] == ["torque_speed_limit"] * said
-        assert data["causes"][0]["probability"] == pytest.approx(0.45 if said else 0.9)
-    assert "repeat the motion" not in times_of_pushes([pushed(1.0, -0.2)])
-    twice = {"causes": [pushed(3.97, -0.2), pushed(4.03, -0.2)]}
-    speed_limit(twice, [log])
-    assert [c["probability"] for c in twice["causes"]] == pytest.approx([0.225, 0.225])
-    assert times_of_pushes(twice["causes"]).endswith(
-        "Those on joint 1 look like a torque limit that falls with the speed: repeat the motion, and such a limit comes back."
-    )
+
+@pytest.mark.parametrize(
+    ("joint", "gain", "alike", "said"),
+    [
+        (1, 1.163, [], True),
+        (2, 1.0 / 1.163, [1], True),
+        (2, 1.0 / 1.163, [], False),
+        (1, 0.86, [], False),
+        (1, 1.4, [], False),
+    ],
+)
+def test_a_gain_beside_a_loss_may_be_a_gear_that_loses_in_both_directions(
+    joint: int, gain: float, alike: list[int], *, said: bool
+) -> None:
+    # Friction of 0.14 times the transmitted torque: a loss of 0.246 while driving, a gain of 1.163.
+    loss = {"effect": "gear_efficiency", "joint": 1, "probability": 0.96, "equivalents": []}
+    loss |= {"parameters": {"loss": {"value": 0.246}}}
+    same = [{"effect": "torque_gain", "joint": other} for other in alike]
+    cause = {"effect": "torque_gain", "joint": joint, "probability": 0.9, "equivalents": same}
+    cause |= {"parameters": {"gain": {"value": gain}}}
+    gear_losses({"causes": [loss, cause]})
+    names = [entry["effect"] for entry in cause["equivalents"]]
+    assert ("gear_losses" in names, cause["probability"]) == (said, pytest.approx(0.45 if said else 0.9))
+    assert loss["probability"] == 0.96
+
+
+def test_a_payload_that_is_one_factor_of_all_parameters_may_be_the_drives() -> None:
+    def data(found: list[float]) -> dict[str, Any]:
+        keys = ("theta1", "theta2", "theta4")
+
+        def values(x: list[float]) -> dict[str, Any]:
+            return {key: {"value": value, "sigma": 0.03} for key, value in zip(keys, x, strict=True)}
+
+        cause = {"effect": "payload", "joint": None, "probability": 0.98, "equivalents": []}
+        parameters = {
+            "nominal": values([1.0, 1.0, 1.0]),
+            "refit": values(found),
+            "with_causes": values([1.01, 0.98, 1.0]),
+        }
+        return {"causes": [cause], "parameters": parameters}
+
+    scaled, loaded = data([1.18, 1.17, 1.18]), data([1.3, 1.1, 1.2])
+    common_gain(scaled)
+    common_gain(loaded)
+    (one,), (other,) = scaled["causes"], loaded["causes"]
+    assert [entry["effect"] for entry in one["equivalents"]] == ["torque_gain"]
+    assert (one["probability"], other["probability"], other["equivalents"]) == (0.49, 0.98, [])

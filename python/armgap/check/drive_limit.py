@@ -32,6 +32,7 @@ __all__ = [
     "deliver",
     "delivered",
     "limited",
+    "slewed",
 ]
 
 Array = NDArray[np.float64]
@@ -240,8 +241,9 @@ def at_rates(base: EquationError, logs: Sequence[Log], joint: int) -> Iterator[t
     """Yield logs (`base`) with one joint's torques limited in rate, and their equation error, for each rate that is tried."""
     tau = [log.tau[:, joint] for log in logs]
     rates = max(float(np.ptp(x)) for x in tau) / np.array(_SLEW_TIMES)
-    for slewed in zip(*(_slewed(log.t, x, rates) for log, x in zip(logs, tau, strict=True)), strict=True):
-        yield _of_joint(base, logs, joint, slewed)
+    behind = (slewed(log.t, x, rates) for log, x in zip(logs, tau, strict=True))
+    for torques in zip(*behind, strict=True):
+        yield _of_joint(base, logs, joint, torques)
 
 
 def _of_joint(
@@ -253,13 +255,13 @@ def _of_joint(
     return there, base.with_rows([r.with_torque(log, joint, x) for r, log, x in rows], joint)
 
 
-def _slewed(t: Array, tau: Array, rates: Array) -> Array:
+def slewed(t: Array, tau: Array, rates: Array) -> Array:
     """Return torques that follow their commands at each of `rates` [N m/s or N/s] at most, from the first command on, shape (n_rates, n_samples)."""
-    slewed = np.empty((len(rates), len(tau)))
-    slewed[:, 0] = now = np.full(len(rates), tau[0])
+    torques = np.empty((len(rates), len(tau)))
+    torques[:, 0] = now = np.full(len(rates), tau[0])
     for k, (step, command) in enumerate(zip(np.outer(np.diff(t), rates), tau[1:], strict=True), start=1):
-        slewed[:, k] = now = np.minimum(np.maximum(command, now - step), now + step)
-    return slewed
+        torques[:, k] = now = np.minimum(np.maximum(command, now - step), now + step)
+    return torques
 
 
 def _with_torques(log: Log, torques: Array, joint: int | None = None) -> Log:

@@ -22,7 +22,16 @@ from armgap.check.stage import unexplained_columns
 from armgap.check.time_shift import causal, early, explains_better, taken_back
 from armgap.diagnosis.custom_effect import CustomEffect, TorqueTables, check_effects
 from armgap.diagnosis.drive_chain import drive_chain
-from armgap.diagnosis.equivalents import beside, encoder_scale, low_pass, speed_limit, torque_loop
+from armgap.diagnosis.equivalents import (
+    beside,
+    center_of_mass,
+    common_gain,
+    encoder_scale,
+    gear_losses,
+    low_pass,
+    torque_loop,
+)
+from armgap.diagnosis.laws_in_place import doubt, laws_in_place, withheld
 from armgap.diagnosis.prepared_input import PreparedInput, prepare, refused
 from armgap.diagnosis.result import Diagnosis
 from armgap.diagnosis.serial_settings import serial_settings
@@ -165,10 +174,13 @@ def _diagnose(given: PreparedInput, settings: dict[str, Any], effects: Sequence[
             return _diagnose(unshifted, settings, effects)
     if not contradictory and (columns := _columns(data, given)):
         return _diagnose(replace(given, checks=(*columns, *given.checks)), settings, effects)
+    instead = [] if contradictory or "withheld" in settings else laws_in_place(data, (*training, *held), arm)
+    if apart := withheld(data, instead):
+        return _diagnose(given, settings | {"withheld": apart}, effects)
     if contradictory:
         data = _contradicted(data)
     data["arm"]["name"] = arm.name
-    speed_limit(data, (*training, *held))
+    doubt(data, instead)
     for cause in (*data["causes"], *data["candidates"]):
         if "log" in cause:
             cause["log"] = _WHOLE.sub("", cause["log"])
@@ -179,6 +191,9 @@ def _diagnose(given: PreparedInput, settings: dict[str, Any], effects: Sequence[
     low_pass(data, given.checks)
     torque_loop(data)
     encoder_scale(data, (*training, *held))
+    center_of_mass(data, arm)
+    gear_losses(data)
+    common_gain(data)
     data["checks"] = [check.to_dict() for check in checks]
     known, corrected_logs = tables.applied(data, (*training, *held))
     count = len(training)

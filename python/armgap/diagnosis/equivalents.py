@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from armgap.arm.arm import Arm
 from armgap.check.check import Check
 from armgap.log.log import Log
 
-__all__ = ["beside", "encoder_scale", "low_pass", "speed_limit", "torque_loop"]
+__all__ = ["beside", "center_of_mass", "common_gain", "encoder_scale", "gear_losses", "low_pass", "torque_loop"]
 
 Array = NDArray[np.float64]
 
@@ -20,16 +20,13 @@ Array = NDArray[np.float64]
 _AS_LIKELY = 0.5
 #: Standard deviations by which a rotor's inertia has to differ from none to be told from it.
 _TOLD = 2.0
-#: Shares of a log, by the mean power of the drive and by its mean torque over as long a time, below those in which a push is what a limit that falls
-#: with the speed does. Of 19 such events on three simulated arms all have 0.94 and 0.90 or more; of five pushes on a real arm none has.
-_POWERFUL, _STRONG = 0.94, 0.9
-#: Time with more torque and more speed outside of pushes up to which a push may be a limit, as a part of its duration (from 0.25 to 2 all of 39
-#: events of such limits count, on ten simulated arms); and factor on the durations of pushes within which that time does not count.
-_BEYOND, _NEAR_PUSH = 0.25, 2.0
+#: Relative difference of a gain from the one that belongs to a gear's loss, up to which both are one gear that loses torque in both directions. On
+#: five simulated arms of another hand whose friction is a share of the transmitted torque it was 0.01 to 0.06.
+_SAME_GEAR = 0.1
+#: Largest excess of the prior cost with a common factor of all torques over that with a payload, per value that the payload has more.
+_BY_CHANCE = 1.0
 #: Share of the variance of an encoder's error along the logs that a straight line over the position has to explain for a wrong scale to do the same.
 _STRAIGHT_SHARE = 0.95
-#: Time over which velocities are averaged [s].
-_SPEED_S = 0.01
 
 
 def beside(name: str, joint: int | None, why: str, *, separates: bool = False) -> dict[str, Any]:
@@ -85,66 +82,68 @@ def encoder_scale(data: dict[str, Any], logs: Sequence[Log]) -> None:
             cause["equivalents"].append(beside("encoder_scale", cause["joint"], why, separates=True))
 
 
-def speed_limit(data: dict[str, Any], logs: Sequence[Log]) -> None:
-    """Add a limit of the torque that falls with the speed to the equivalents of pushes that are what such a limit does.
+def center_of_mass(data: dict[str, Any], arm: Arm) -> None:
+    """Add a centre of mass beside the link's axis to the equivalents of an encoder offset of the last joint of a planar arm with gravity.
 
-    A push counts if it acts against the command while the drive gives nearly as much power and torque as anywhere in the log, and if the joint hardly
-    ever has more torque and more speed at once without a push: there the limit would act too. The probability is halved, and halved again for each
-    further such push on the same joint, as pushes come at any time.
+    Both turn the terms of gravity and of coupling by one angle, in which the last link's angle stands alone.
     """
-    by_name = {log.name: log for log in logs}
-    pushes = [c for c in data["causes"] if c.get("log") in by_name and c["joint"] is not None]
-    found = [cause for cause in pushes if _is_limit(cause, pushes, by_name)]
-    count = Counter(cause["joint"] for cause in found)
-    for cause in found:
-        cause["probability"] *= _AS_LIKELY ** count[cause["joint"]]
-        why = (
-            "it acts against the command where the drive gives nearly as much power as anywhere in the log: a limit that falls with the speed, as by "
-            "the supply voltage, does the same, and comes back when the motion is repeated"
-        )
-        cause["equivalents"].append(beside("torque_speed_limit", cause["joint"], why, separates=True))
+    if arm.chain is not None or not all(arm.rotary_joints) or len(arm.gravity_parameters) == 0:
+        return
+    why = "the last link's centre of mass beside its axis turns the same torques by the same angle; a reading at a known position tells them apart"
+    for cause in data["causes"]:
+        if cause["effect"] == "encoder_offset" and cause["joint"] == arm.n_joints:
+            cause["equivalents"].append(beside("center_of_mass", cause["joint"], why))
 
 
-def _is_limit(push: dict[str, Any], pushes: Sequence[dict[str, Any]], logs: dict[str, Log]) -> bool:
-    log, j = logs[push["log"]], push["joint"] - 1
-    during = _during(push, log, 1.0)
-    if not during.any():
-        return False
-    tau, speed = log.tau[:, j], _speed(log, j)
-    at_push = float(tau[during].mean()), float(speed[during].mean())
-    against = float(push["parameters"]["impulse"]["value"]) * at_push[0] < 0.0
-    drives = at_push[0] * at_push[1] > 0.0
-    samples = int(during.sum())
-    ranks = [
-        float(np.mean(_mean(x, samples) < x[during].mean())) for x in (tau * speed, np.sign(tau[during].sum()) * tau)
-    ]
-    if not (against and drives and ranks[0] >= _POWERFUL and ranks[1] >= _STRONG):
-        return False
-    beyond = 0.0
-    for other in logs.values():
-        free = np.ones(len(other), dtype=bool)
-        for known in pushes:
-            if known["joint"] == push["joint"] and known["log"] == other.name:
-                free &= ~_during(known, other, _NEAR_PUSH)
-        ratio = [x / at for x, at in zip((other.tau[:, j], _speed(other, j)), at_push, strict=True)]
-        # The same direction as at the push, or both the other way round.
-        more = (ratio[0] * ratio[1] > 0.0) & (np.minimum(np.abs(ratio[0]), np.abs(ratio[1])) >= 1.0)
-        beyond += float(np.count_nonzero(more & free)) * other.sample_period
-    return beyond <= _BEYOND * samples * log.sample_period
+def gear_losses(data: dict[str, Any]) -> None:
+    """Add a gear that loses torque in both directions of power to the equivalents of a torque gain beside a gear efficiency.
+
+    Friction of ``mu`` times the transmitted torque leaves ``tau / (1 + mu)`` of the motor's torque while it drives and ``tau / (1 - mu)`` while it
+    brakes: a gain of ``1 / (1 - mu)`` and, beside it, a loss of ``2 mu / (1 + mu)`` while driving.
+    """
+    losses = {c["joint"]: c["parameters"]["loss"]["value"] for c in data["causes"] if c["effect"] == "gear_efficiency"}
+    for cause in data["causes"]:
+        if cause["effect"] != "torque_gain":
+            continue
+        gain = cause["parameters"]["gain"]["value"]
+        same = {cause["joint"]: gain}
+        # The inverse gain on another joint, where the two are not told apart.
+        same |= {e["joint"]: 1.0 / gain for e in cause["equivalents"] if e["effect"] == "torque_gain"}
+        for joint, value in same.items():
+            loss = losses.get(joint)
+            if loss is not None and abs(value * (1.0 - loss / (2.0 - loss)) - 1.0) < min(
+                _SAME_GEAR, 0.5 * abs(value - 1.0)
+            ):
+                cause["probability"] *= _AS_LIKELY
+                why = (
+                    f"with the loss of {loss:.3g} beside it: a gear that loses torque in both directions does the same"
+                )
+                cause["equivalents"].append(beside("gear_losses", joint, why))
+                break
 
 
-def _during(push: dict[str, Any], log: Log, wide: float) -> NDArray[np.bool_]:
-    """Return a mask of a log's samples within a push, whose duration is multiplied by `wide`."""
-    time, duration = (float(push["parameters"][name]["value"]) for name in ("time", "duration"))
-    return np.abs(log.t - time) <= 0.5 * wide * duration
+def common_gain(data: dict[str, Any]) -> None:
+    """Add a common factor of all torques to the equivalents of a payload that explains the arm's parameters no better.
 
+    A payload is told from the arm's other values by the arm file alone. Drives that all deliver less than they are commanded raise all parameters in
+    proportion, at the cost of one value where a payload has two.
+    """
+    nominal, refit, with_causes = (data["parameters"].get(key) for key in ("nominal", "refit", "with_causes"))
+    payloads = [cause for cause in data["causes"] if cause["effect"] == "payload"]
+    if not (payloads and nominal and refit and with_causes):
+        return
+    keys = [key for key, entry in nominal.items() if np.isfinite(entry["sigma"]) and entry["sigma"] > 0.0]
+    given, sigma = (np.array([nominal[key][part] for key in keys]) for part in ("value", "sigma"))
 
-def _speed(log: Log, j: int) -> Array:
-    """Return the velocity of joint `j` (from 0), averaged over `_SPEED_S`."""
-    return _mean(np.gradient(log.q[:, j], log.t), round(_SPEED_S / log.sample_period))
+    def cost(values: dict[str, Any], factor: float = 1.0) -> float:
+        found = np.array([values[key]["value"] for key in keys])
+        return float(np.sum(((found * factor - given) / sigma) ** 2))
 
-
-def _mean(x: Array, samples: int) -> Array:
-    """Return the running mean over some samples, at least one."""
-    width = max(samples, 1)
-    return np.convolve(x, np.full(width, 1.0 / width), "same")
+    found = np.array([refit[key]["value"] for key in keys])
+    weight = found / sigma
+    factor = float(weight @ (given / sigma) / (weight @ weight))
+    if cost(refit, factor) < cost(with_causes) + _BY_CHANCE:
+        why = f"torques that are all {factor:.3g} of their commands explain the arm file's values as well; a weighed part tells them apart"
+        for cause in payloads:
+            cause["probability"] *= _AS_LIKELY
+            cause["equivalents"].append(beside("torque_gain", None, why))

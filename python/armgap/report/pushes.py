@@ -7,6 +7,14 @@ from typing import Any
 
 __all__ = ["many_pushes", "times_of_pushes"]
 
+#: Laws that a diagnosis lists as equivalents of pushes, and what they are.
+LAWS = {
+    "torque_rate_limit": "a limit of the drive",
+    "torque_speed_limit": "a limit of the drive",
+    "torque_threshold": "a limit of the drive",
+    "torque_asymmetric_limit": "a limit of the drive",
+    "uneven_friction": "uneven friction",
+}
 #: Largest number of pushes whose values a summary gives; of more it gives joints, logs, times and probabilities.
 MOST_PUSHES = 2
 
@@ -43,9 +51,9 @@ def times_of_pushes(pushes: list[dict[str, Any]]) -> str:
     ]
     text = f"Pushes: {'; '.join(groups)}; in brackets their probabilities."
     alike = {
-        e["joint"] for push in pushes for e in push.get("equivalents") or [] if e["effect"] == "torque_speed_limit"
+        (LAWS[e["effect"]], e["joint"]) for push in pushes for e in push.get("equivalents") or [] if e["effect"] in LAWS
     }
-    if alike:
-        joints = " and ".join(f"joint {joint}" for joint in sorted(alike))
-        text += f" Those on {joints} look like a torque limit that falls with the speed: repeat the motion, and such a limit comes back."
+    for law in sorted({law for law, _ in alike}):
+        joints = " and ".join(f"joint {joint}" for other, joint in sorted(alike) if other == law)
+        text += f" Those on {joints} look like {law}: repeat the motion, and it comes back."
     return text

@@ -1,0 +1,319 @@
+"""Laws that no effect of the library has, in place of the pushes, lags and delays of a diagnosis.
+
+A drive that changes its torque at a limited rate, delivers less at speed or nothing below a threshold, or has another limit in either direction, and
+friction that rises in places, do at certain times what a push does, again and again. Three tests tell them from pushes, with one or two values
+against three for every push:
+
+* *equation of motion*: behind a law of the drive hardly any torque is left unexplained. It finds laws that act most of the time, of which the pushes
+  are the largest events only, and those that pass for a lag.
+* *impulses*: the torque that such a law takes from the command within the pushes has their impulses, and is small elsewhere.
+* *direction*: friction acts against the motion, and pushes in either direction.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from math import comb
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armgap.arm.arm import Arm
+from armgap.check.drive_limit import LIMITED, slewed
+from armgap.check.equation_error import FEWEST_ROWS, EquationError, Rows, bounds
+from armgap.diagnosis.equivalents import beside
+from armgap.log.log import Log
+
+__all__ = ["LawInPlace", "doubt", "laws_in_place", "withheld"]
+
+Array = NDArray[np.float64]
+
+#: Share of the pushes' squared impulses, those that the law gives elsewhere added, up to which a law of the drive explains the pushes. On simulated
+#: arms of another hand thresholds left 0.16 to 0.19 (three arms), limits by speed 0.004 to 0.024 (three), and ten pushes on six arms 0.69 or more.
+LEFT_OF_IMPULSES = 0.3
+#: Probability below which a cause is not named (as in the compiled core).
+NAMEABLE = 0.3
+#: Probability of a push beside a law of the drive that explains it, as a part of its probability without it, for every push on the joint: pushes come
+#: at any time.
+_AS_LIKELY = 0.5
+#: Factor on the chance that as many pushes act against the motion: fewer than four pushes are not withheld for their direction alone.
+_SEVERAL = 4.0
+#: Part of the mean speed within a push that its mean velocity must have for the push to act with or against the motion.
+_IN_ONE_DIRECTION = 0.5
+#: Shortest half width of the stretch around a push in which a law's impulse is taken [s].
+_REACH_S = 0.03
+#: Time over which velocities are averaged [s].
+_SPEED_S = 0.01
+#: Times that a drive needs for the range of its commands at the rates that are tried [s].
+_SLEW_TIMES = tuple(0.01 * 1.25**k for k in range(31))
+#: Quantiles of the size of the torque at which thresholds are tried, and limits of either direction.
+_THRESHOLDS = (*np.arange(0.005, 0.05, 0.005), *np.arange(0.05, 0.6, 0.02))
+_LIMITS = (0.5, 0.6, 0.7, 0.8, 0.85, 0.9, 0.95, 0.975, 1.0)
+#: Torques at standstill, and their decrease up to the log's speeds, relative to the largest torque, of limits that fall with the speed.
+_STALL = (
+    0.3,
+    0.4,
+    0.5,
+    0.55,
+    0.6,
+    0.65,
+    0.7,
+    0.75,
+    0.8,
+    0.85,
+    0.9,
+    0.95,
+    1.0,
+    1.05,
+    1.1,
+    1.2,
+    1.3,
+    1.5,
+    1.7,
+    2.0,
+    2.5,
+    3.0,
+    4.0,
+)
+_FALL = (0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0)
+#: Causes that a limited drive resembles besides pushes.
+_LATE = ("actuator_lag", "actuator_delay")
+#: What each law of a drive is, in words, by its name in results.
+_WORDS = {
+    "torque_rate_limit": "a drive whose torque changes by at most {:.3g} {}/s does the same",
+    "torque_speed_limit": "a limit of the torque that falls with the speed, as by the supply voltage, does the same",
+    "torque_threshold": "a drive that delivers nothing below {:.3g} {} does the same",
+    "torque_asymmetric_limit": "a drive with limits of {:.3g} and -{:.3g} {} does the same",
+}
+
+
+@dataclass(frozen=True)
+class LawInPlace:
+    """A law on one joint that explains what a diagnosis calls pushes, a lag or a delay.
+
+    Attributes
+    ----------
+    name : str
+        Name of the law in results.
+    joint : int
+        The joint, from 1.
+    why : str
+        What the law does instead, in words.
+    factor : float
+        Probability of what the law explains, as a part of its probability without the law, 0 to 1.
+    throughout : bool
+        Whether the equation of motion has told the law, so that it stands for a lag or delay too.
+    """
+
+    name: str
+    joint: int
+    why: str
+    factor: float
+    throughout: bool = False
+
+    def explains(self, cause: dict[str, Any]) -> bool:
+        """Whether a cause of a diagnosis is one that the law explains."""
+        joints = cause.get("joints") or [cause["joint"]]
+        return self.joint in joints and ("log" in cause or (self.throughout and cause["effect"] in _LATE))
+
+
+def laws_in_place(data: dict[str, Any], logs: Sequence[Log], arm: Arm) -> list[LawInPlace]:
+    """Return the laws that explain pushes, lags and delays of a diagnosis of a planar arm, one per joint at most.
+
+    Parameters
+    ----------
+    data : dict
+        Diagnosis as a JSON object.
+    logs : sequence of Log
+        All its logs.
+    arm : Arm
+        Nominal model.
+    """
+    if arm.chain is not None or not all(log.has_torques for log in logs):
+        return []
+    names = {log.name for log in logs}
+    found = []
+    for joint in range(1, arm.n_joints + 1):
+        causes = [c for c in data["causes"] if joint in (c.get("joints") or [c["joint"]])]
+        pushes = [c for c in causes if c.get("log") in names]
+        late = any(c["effect"] in _LATE for c in causes)
+        law = _by_equation(logs, arm, joint) if pushes or late else None
+        if law is None and pushes:
+            law = _by_impulses(pushes, logs, arm, joint) or _by_direction(pushes, logs, joint)
+        if law is not None:
+            found.append(law)
+    return found
+
+
+def doubt(data: dict[str, Any], laws: Sequence[LawInPlace]) -> None:
+    """Add laws to the equivalents of the causes that they explain, and lower these causes' probabilities."""
+    for law in laws:
+        for cause in data["causes"]:
+            if law.explains(cause):
+                cause["probability"] *= law.factor
+                cause["equivalents"].append(beside(law.name, law.joint, law.why, separates=True))
+
+
+def withheld(data: dict[str, Any], laws: Sequence[LawInPlace]) -> list[tuple[str, int | None, str]]:
+    """Return the causes that are not to be named beside the laws: effect, joint (from 1) and reason, each once."""
+    found: dict[tuple[str, int | None], str] = {}
+    for law in laws:
+        for cause in data["causes"]:
+            if law.explains(cause) and cause["probability"] * law.factor < NAMEABLE:
+                found[cause["effect"], cause["joint"]] = law.why
+    return [(effect, joint, why) for (effect, joint), why in found.items()]
+
+
+def _in_words(name: str, values: Sequence[float], arm: Arm, joint: int) -> str:
+    return _WORDS[name].format(*values, "N m" if joint in arm.rotary_joints else "N")
+
+
+def _by_equation(logs: Sequence[Log], arm: Arm, joint: int) -> LawInPlace | None:
+    """Return the law of the drive behind which the equation of motion leaves hardly any of a joint's unexplained torque; None if there is none."""
+    j = joint - 1
+    rows = [Rows.of(log, arm) for log in logs]
+    moving = [r.moving(log) for r, log in zip(rows, logs, strict=True)]
+    base = EquationError([r.within(mask) for r, mask in zip(rows, moving, strict=True)], arm)
+    if len(base) < FEWEST_ROWS:
+        return None
+    low, high = bounds(arm)
+
+    def unexplained(torques: Sequence[Array] | None) -> float:
+        errors = base
+        if torques is not None:
+            changed = zip(rows, moving, logs, torques, strict=True)
+            errors = base.with_rows([r.with_torque(log, j, x).within(mask) for r, mask, log, x in changed], j)
+        return float(errors.fit(low, high).share[j] * errors.scale[j])
+
+    whole = unexplained(None)
+    laws = (
+        (
+            name,
+            values,
+            unexplained([log.tau[:, j] + x for log, x in zip(logs, missing, strict=True)]) / max(whole, 1e-30),
+        )
+        for name, values, missing in (*_rates(logs, j), *_falling(logs, j, _STALL[::2], _FALL[2::2]))
+    )
+    name, values, left = min(laws, key=lambda law: law[2], default=("", (), np.inf))
+    if left >= LIMITED:
+        return None
+    said = f"{_in_words(name, values, arm, joint)}: behind it {left:.1%} of the joint's unexplained torque is left, and it comes back with the motion"
+    return LawInPlace(name, joint, said, left, throughout=True)
+
+
+def _by_impulses(pushes: Sequence[dict[str, Any]], logs: Sequence[Log], arm: Arm, joint: int) -> LawInPlace | None:
+    """Return the law of the drive that gives the impulses of the pushes on one joint and little elsewhere; None if there is none."""
+    j = joint - 1
+    index = {log.name: i for i, log in enumerate(logs)}
+    impulses = np.array([push["parameters"]["impulse"]["value"] for push in pushes])
+    during: list[tuple[int, NDArray[np.bool_]]] = []
+    free = [np.ones(len(log), dtype=bool) for log in logs]
+    reach = []
+    for push in pushes:
+        i = index[push["log"]]
+        time, duration = (float(push["parameters"][key]["value"]) for key in ("time", "duration"))
+        reach.append(max(duration, _REACH_S))
+        mask = np.abs(logs[i].t - time) <= reach[-1]
+        during.append((i, mask))
+        free[i] &= ~mask
+    width = 2.0 * float(np.median(reach))
+    whole = float(np.sum(impulses**2))
+
+    def left(missing: Sequence[Array]) -> float:
+        given = np.array([np.sum(missing[i][mask]) * logs[i].sample_period for i, mask in during])
+        elsewhere = 0.0
+        for log, x, mask in zip(logs, missing, free, strict=True):
+            count = max(round(width / log.sample_period), 1)
+            sums = np.add.reduceat(np.where(mask, x, 0.0) * log.sample_period, np.arange(0, len(x), count))
+            elsewhere += float(np.sum(sums**2))
+        return (float(np.sum((impulses - given) ** 2)) + elsewhere) / whole
+
+    laws = (
+        (name, values, left(missing))
+        for name, values, missing in (
+            *_rates(logs, j),
+            *_thresholds(logs, j),
+            *_falling(logs, j, _STALL, _FALL),
+            *_two_limits(logs, j),
+        )
+    )
+    name, values, share = min(laws, key=lambda law: law[2])
+    if share >= LEFT_OF_IMPULSES:
+        return None
+    said = f"{_in_words(name, values, arm, joint)} at the times of the pushes and hardly anything elsewhere, and comes back with the motion"
+    return LawInPlace(name, joint, said, _AS_LIKELY ** len(pushes))
+
+
+def _by_direction(pushes: Sequence[dict[str, Any]], logs: Sequence[Log], joint: int) -> LawInPlace | None:
+    """Return friction that rises in places or at times, if more pushes on a joint act against its motion than chance explains; None otherwise."""
+    by_name = {log.name: log for log in logs}
+    against = []
+    for push in pushes:
+        log = by_name[push["log"]]
+        time, duration, impulse = (float(push["parameters"][key]["value"]) for key in ("time", "duration", "impulse"))
+        speed = _speed(log, joint - 1)[np.abs(log.t - time) <= 0.5 * duration]
+        if len(speed) and abs(speed.mean()) > _IN_ONE_DIRECTION * np.abs(speed).mean():
+            against.append(impulse * speed.mean() < 0.0)
+    count, opposed = len(against), sum(against)
+    # Probability that as many of the pushes or more act against the motion, and as few against it.
+    chance = min(1.0, _SEVERAL * sum(comb(count, k) for k in range(opposed, count + 1)) / 2.0**count)
+    if chance >= 1.0:
+        return None
+    said = f"{opposed} of {count} pushes on the joint act against its motion, as friction does that rises in places or at times"
+    return LawInPlace("uneven_friction", joint, said, chance)
+
+
+Law = tuple[str, tuple[float, ...], list[Array]]
+
+
+def _rates(logs: Sequence[Log], j: int) -> Iterator[Law]:
+    """Yield limits of the rate of torque, with the torque that each adds to the command."""
+    tau = [log.tau[:, j] for log in logs]
+    rates = max(float(np.ptp(x)) for x in tau) / np.array(_SLEW_TIMES)
+    behind = [slewed(log.t, x, rates) for log, x in zip(logs, tau, strict=True)]
+    for k, rate in enumerate(rates):
+        yield "torque_rate_limit", (float(rate),), [x[k] - command for x, command in zip(behind, tau, strict=True)]
+
+
+def _thresholds(logs: Sequence[Log], j: int) -> Iterator[Law]:
+    """Yield thresholds below which a drive delivers nothing, with the torque that each adds to the command."""
+    tau = [log.tau[:, j] for log in logs]
+    for level in np.unique(np.quantile(np.abs(np.concatenate(tau)), _THRESHOLDS)):
+        yield "torque_threshold", (float(level),), [np.where(np.abs(x) < level, -x, 0.0) for x in tau]
+
+
+def _falling(logs: Sequence[Log], j: int, stall: Sequence[float], fall: Sequence[float]) -> Iterator[Law]:
+    """Yield limits that fall with the speed in the direction of the torque, with the torque that each adds to the command."""
+    tau = [log.tau[:, j] for log in logs]
+    speed = [_speed(log, j) for log in logs]
+    top = float(np.abs(np.concatenate(tau)).max())
+    fast = float(np.quantile(np.abs(np.concatenate(speed)), 0.99))
+    if top == 0.0 or fast == 0.0:
+        return
+    for slope in fall:
+        for level in stall:
+            limits = [
+                np.where(x * v > 0.0, np.maximum(level - slope * np.abs(v) / fast, 0.0) * top, np.inf)
+                for x, v in zip(tau, speed, strict=True)
+            ]
+            missing = [np.clip(x, -limit, limit) - x for x, limit in zip(tau, limits, strict=True)]
+            yield "torque_speed_limit", (level * top, slope * top / fast), missing
+
+
+def _two_limits(logs: Sequence[Log], j: int) -> Iterator[Law]:
+    """Yield limits that differ by direction, with the torque that each adds to the command."""
+    tau = [log.tau[:, j] for log in logs]
+    whole = np.concatenate(tau)
+    if whole.max() <= 0.0 or whole.min() >= 0.0:
+        return
+    for up in np.quantile(whole[whole > 0.0], _LIMITS):
+        for down in np.quantile(-whole[whole < 0.0], _LIMITS):
+            yield "torque_asymmetric_limit", (float(up), float(down)), [np.clip(x, -down, up) - x for x in tau]
+
+
+def _speed(log: Log, j: int) -> Array:
+    """Return the velocity of joint `j` (from 0), averaged over `_SPEED_S`."""
+    width = max(round(_SPEED_S / log.sample_period), 1)
+    return np.convolve(np.gradient(log.q[:, j], log.t), np.full(width, 1.0 / width), "same")

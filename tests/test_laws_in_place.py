@@ -1,0 +1,106 @@
+"""Laws of drives and of friction in place of pushes, lags and delays."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from armgap import Arm, Log, simulate
+from armgap.check.drive_limit import slewed
+from armgap.diagnosis.laws_in_place import LawInPlace, doubt, laws_in_place, withheld
+from armgap.report.pushes import times_of_pushes
+
+PERIOD = 0.002
+TIMES = PERIOD * np.arange(4000)
+PENDULUM = Arm("bench", "pendulum", 9.81, PERIOD, [0.1, 2.0, 0.05, 0.1], sigma=[0.01, 0.2, 0.03, 0.05])
+
+
+def pushed(
+    time: float, impulse: float, duration: float = 0.1, joint: int = 1, probability: float = 0.9
+) -> dict[str, Any]:
+    """Return a push as a diagnosis has it."""
+    values = {"time": time, "duration": duration, "impulse": impulse}
+    parameters = {name: {"value": value} for name, value in values.items()}
+    return {
+        "effect": "external_pulse", "joint": joint, "log": "run", "probability": probability, "equivalents": [], "parameters": parameters,
+    }  # fmt: skip
+
+
+def found(causes: list[dict[str, Any]], tau: NDArray[np.float64], q: NDArray[np.float64]) -> list[LawInPlace]:
+    """Return the laws in place of the causes of one log of a pendulum."""
+    return laws_in_place({"causes": causes}, [Log("run", TIMES, q[:, None], tau[:, None], None)], PENDULUM)
+
+
+def impulses(missing: NDArray[np.float64], threshold: float) -> list[dict[str, Any]]:
+    """Return what is missing from the torque as pushes, where it is more than a threshold in size."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], (np.abs(missing) > threshold).astype(int), [0]])))
+    pairs = list(zip(edges[::2], edges[1::2], strict=True))
+    return [
+        pushed(TIMES[(a + b) // 2], float(missing[a:b].sum() * PERIOD), float((b - a) * PERIOD))
+        for a, b in pairs
+        if b - a > 5
+    ]
+
+
+@pytest.mark.parametrize("name", ["torque_threshold", "torque_speed_limit", "torque_asymmetric_limit"])
+def test_a_law_of_the_drive_gives_the_impulses_of_all_pushes(name: str) -> None:
+    q = np.sin(2 * np.pi * 0.4 * TIMES) + 0.4 * np.sin(2 * np.pi * 1.1 * TIMES)
+    speed = np.gradient(q, TIMES)
+    tau = 2.0 * np.cos(2 * np.pi * 0.31 * TIMES + 0.4) + 1.0 * np.cos(2 * np.pi * 0.83 * TIMES)
+    if name == "torque_threshold":
+        missing = np.where(np.abs(tau) < 0.3, -tau, 0.0)
+    elif name == "torque_speed_limit":
+        limit = np.where(tau * speed > 0.0, np.maximum(2.6 - 0.5 * np.abs(speed), 0.0), np.inf)
+        missing = np.clip(tau, -limit, limit) - tau
+    else:
+        missing = np.clip(tau, -2.2, 2.7) - tau
+    pushes = impulses(missing, 0.02)
+    assert len(pushes) >= 3
+    (law,) = found(pushes, tau, q)
+    assert (law.name, law.joint, law.throughout) == (name, 1, False)
+    assert law.factor == 0.5 ** len(pushes)
+    assert [(effect, joint) for effect, joint, _ in withheld({"causes": pushes}, [law])] == [("external_pulse", 1)]
+    # Pushes of the same impulses at other times are no law's.
+    for push in pushes:
+        push["parameters"]["time"]["value"] += 0.37
+    assert all(other.name == "uneven_friction" for other in found(pushes, tau, q))
+
+
+def test_a_drive_of_limited_rate_passes_for_a_delay_and_pushes() -> None:
+    command = 1.5 * np.sign(np.sin(2 * np.pi * 0.7 * TIMES)) + 0.8 * np.sin(2 * np.pi * 2.3 * TIMES)
+    tau = slewed(TIMES, command, np.array([12.0]))[0]
+    log = simulate(PENDULUM, TIMES, tau[:, None], encoder=False)
+    late = {"effect": "actuator_delay", "joint": 1, "probability": 0.9, "equivalents": []}
+    causes = [late, pushed(1.0, 0.1)]
+    (law,) = found(causes, command, log.q[:, 0])
+    assert (law.name, law.throughout) == ("torque_rate_limit", True)
+    assert law.factor < 0.1
+    rate = float(law.why.split("at most ")[1].split()[0])
+    assert rate == pytest.approx(12.0, rel=0.13), "the rates that are tried are a quarter apart"
+    assert {effect for effect, _, _ in withheld({"causes": causes}, [law])} == {"actuator_delay", "external_pulse"}
+    # Where the drive delivers what it is commanded there is no such law.
+    assert found(causes, tau, log.q[:, 0]) == []
+
+
+def test_pushes_that_all_act_against_the_motion_may_be_friction() -> None:
+    q = np.sin(2 * np.pi * 0.25 * TIMES)
+    tau = 0.1 * np.cos(2 * np.pi * 0.4 * TIMES)
+    # The joint moves up around t = 0, 4 and 8 s, and down around 2 and 6 s.
+    times = (0.4, 2.0, 3.7, 4.2, 6.1, 7.6)
+    signs = (-1, 1, -1, -1, 1, -1)
+    pushes = [pushed(t, 0.2 * sign) for t, sign in zip(times, signs, strict=True)]
+    (law,) = found(pushes, tau, q)
+    assert (law.name, law.factor) == ("uneven_friction", 4.0 / 2**6)
+    assert found(pushes[:2], tau, q) == [], "two are no evidence"
+    assert found([pushed(t, 0.2) for t in times], tau, q) == [], "in either direction"
+    data = {"causes": pushes[:4]}
+    (law,) = found(pushes[:4], tau, q)
+    doubt(data, [law])
+    assert [c["probability"] for c in data["causes"]] == pytest.approx(4 * [0.9 * 0.25])
+    assert times_of_pushes(data["causes"]).endswith(
+        "Those on joint 1 look like uneven friction: repeat the motion, and it comes back."
+    )
+    assert "repeat the motion" not in times_of_pushes([pushed(1.0, -0.2)])
