@@ -62,11 +62,30 @@ def test_a_law_of_the_drive_gives_the_impulses_of_all_pushes(name: str) -> None:
     (law,) = found(pushes, tau, q)
     assert (law.name, law.joint, law.throughout) == (name, 1, False)
     assert law.factor == 0.5 ** len(pushes)
-    assert [(effect, joint) for effect, joint, _ in withheld({"causes": pushes}, [law])] == [("external_pulse", 1)]
+    apart = {effect for effect, joint, _ in withheld({"causes": pushes}, [law]) if joint == 1}
+    assert apart == {"external_pulse", "actuator_lag", "actuator_delay"}, "no lag takes up what the pushes were"
     # Pushes of the same impulses at other times are no law's.
     for push in pushes:
         push["parameters"]["time"]["value"] += 0.37
     assert all(other.name == "uneven_friction" for other in found(pushes, tau, q))
+
+
+def test_a_limit_of_one_direction_stands_behind_the_named_limit_of_the_other() -> None:
+    q = np.sin(2 * np.pi * 0.4 * TIMES)
+    tau = 3.0 * np.cos(2 * np.pi * 0.31 * TIMES + 0.4)
+    limited = np.clip(tau, -2.4, 2.4)
+    pushes = impulses(np.clip(tau, -2.4, 1.9) - limited, 0.02)
+    assert len(pushes) >= 2
+    saturation = {
+        "effect": "torque_saturation",
+        "joint": 1,
+        "probability": 1.0,
+        "parameters": {"level": {"value": 2.4}},
+    }
+    (law,) = found([saturation, *pushes], tau, q)
+    assert law.name == "torque_asymmetric_limit"
+    up = float(law.why.split("limits of ")[1].split()[0])
+    assert up == pytest.approx(1.9, rel=0.1)
 
 
 def test_a_drive_of_limited_rate_passes_for_a_delay_and_pushes() -> None:
@@ -80,7 +99,8 @@ def test_a_drive_of_limited_rate_passes_for_a_delay_and_pushes() -> None:
     assert law.factor < 0.1
     rate = float(law.why.split("at most ")[1].split()[0])
     assert rate == pytest.approx(12.0, rel=0.13), "the rates that are tried are a quarter apart"
-    assert {effect for effect, _, _ in withheld({"causes": causes}, [law])} == {"actuator_delay", "external_pulse"}
+    apart = {effect for effect, _, _ in withheld({"causes": causes}, [law])}
+    assert apart == {"actuator_delay", "actuator_lag", "external_pulse"}
     # Where the drive delivers what it is commanded there is no such law.
     assert found(causes, tau, log.q[:, 0]) == []
 
@@ -96,10 +116,16 @@ def test_pushes_that_all_act_against_the_motion_may_be_friction() -> None:
     assert (law.name, law.factor) == ("uneven_friction", 4.0 / 2**6)
     assert found(pushes[:2], tau, q) == [], "two are no evidence"
     assert found([pushed(t, 0.2) for t in times], tau, q) == [], "in either direction"
+    sizes = (0.2, 0.28, 0.23, 0.17, 0.25, 0.21)
+    resisting = [pushed(t, size * sign) for t, size, sign in zip(times, sizes, signs, strict=True)]
+    assert found(resisting, tau, q) == [], "somebody who holds against the motion"
     data = {"causes": pushes[:4]}
     (law,) = found(pushes[:4], tau, q)
     doubt(data, [law])
     assert [c["probability"] for c in data["causes"]] == pytest.approx(4 * [0.9 * 0.25])
+    faint = [pushed(0.4, -0.2, probability=0.5), pushed(2.0, 0.2), pushed(3.7, -0.2)]
+    (law,) = found(faint, tau, q)
+    assert withheld({"causes": faint}, [law]) == [], "the most probable push keeps 0.45"
     assert times_of_pushes(data["causes"]).endswith(
         "Those on joint 1 look like uneven friction: repeat the motion, and it comes back."
     )

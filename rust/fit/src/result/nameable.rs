@@ -109,18 +109,19 @@ fn part_of_a_wave(effect: &EffectInstance, travel: f64) -> Option<String> {
     })
 }
 
-/// Reason why a drag is no effect of its own: a stronger one of another power on the same joint has the opposite sign, so that both together stand for a
-/// curve over speed that neither is.
+/// Reason why a drag is no effect of its own: with a stronger drag of the opposite sign, or a negative one beside a Stribeck friction, on the same joint it
+/// is a part of a curve over speed that neither is.
 fn opposed(cause: &Cause, beside: &[Cause]) -> Option<String> {
     let is_drag = |c: &Cause| matches!(c.effect.law.spec().name, "quadratic_drag" | "cubic_drag");
     let opposes = |other: &Cause| {
-        is_drag(other)
-            && other.effect.joint == cause.effect.joint
+        let is_stronger_drag = is_drag(other)
             && other.effect.p[0] * cause.effect.p[0] < 0.0
-            && other.relevance > cause.relevance
+            && other.relevance > cause.relevance;
+        let is_stribeck = other.effect.law.spec().name == "stribeck" && cause.effect.p[0] < 0.0;
+        other.effect.joint == cause.effect.joint && (is_stronger_drag || is_stribeck)
     };
     (is_drag(cause) && beside.iter().any(opposes)).then(|| {
-        "with a stronger drag of the opposite sign beside it, it is part of a curve over speed that is neither"
+        "with the friction beside it, which it opposes, it is part of a curve over speed that neither is"
             .to_owned()
     })
 }
@@ -276,8 +277,10 @@ mod tests {
         assert!(opposed(&pair[0], &pair).is_none() && opposed(&pair[1], &pair).is_some());
         let same = [drag("quadratic_drag", 0.9, 0.2), drag("cubic_drag", 0.1, 0.1)];
         assert!(same.iter().all(|cause| opposed(cause, &same).is_none()));
-        let other = [drag("quadratic_drag", 0.9, 0.2), drag("stribeck", -0.1, 0.1)];
+        let other = [drag("quadratic_drag", 0.9, 0.2), drag("stribeck", 0.1, 0.1)];
         assert!(other.iter().all(|cause| opposed(cause, &other).is_none()));
+        let falling = [drag("quadratic_drag", -0.9, 0.2), drag("stribeck", 0.1, 0.1)];
+        assert!(opposed(&falling[0], &falling).is_some() && opposed(&falling[1], &falling).is_none());
     }
 
     #[test]

@@ -14,6 +14,7 @@ use crate::search::acceptance::{ABOVE_FLOOR, Ground, UNEXPLAINED};
 use crate::search::attribute::SearchNode;
 use crate::search::belief::{Cause, belief_beside, left_over};
 use crate::search::model_search::Attribution;
+use crate::search::rivals::rival_law::LawBeside;
 use armgap_core::arm::Arm;
 use armgap_core::effect::{Scope, Trial};
 use rayon::prelude::*;
@@ -50,6 +51,10 @@ pub struct Evidence {
     /// Rise of the holdout's cost without the cause, everything else fitted again, relative to the cost above the noise floor with the cause; the
     /// training logs' where no more than noise remains on the holdout, and none where this holds of both.
     pub gain: Option<f64>,
+    /// The gain beside a torque without a name: the same rise of the cost where the model has, in addition, the table over one or two variables that best
+    /// predicts what the causes leave; none where no table predicts. A cause that the table makes superfluous only stood for a part of it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gain_beside: Option<f64>,
     /// Standard error of the gain, from the scatter between the holdout's windows.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gain_sigma: Option<f64>,
@@ -76,7 +81,7 @@ impl Evidence {
         let beyond = self.beyond_scatter.map_or(1.0, |odds| 1.0 / (1.0 + 1.0 / odds));
         let Some(gain) = self.gain else { return beyond * self.selected };
         let odds = PRIOR_ODDS
-            * gain.max(0.0).powf(GAIN_POWER)
+            * self.gain_beside.map_or(gain, |beside| beside.min(gain)).max(0.0).powf(GAIN_POWER)
             * self.agreement()
             * self.left_by_rival().powi(RIVAL_POWER);
         beyond * self.selected * odds / (1.0 + odds)
@@ -157,6 +162,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let error = self.holdout_error(&last.weights, &model.hypothesis);
         let has_rivals = rest.is_some() && !judged_in_training;
         let besides = if has_rivals { self.laws_beside(model, &last.weights, true) } else { Vec::new() };
+        let best_beside = besides.iter().min_by(|a, b| a.cost.total_cmp(&b.cost));
         causes.par_iter_mut().for_each(|cause| {
             let Some(place) = model.hypothesis.effects.iter().position(|e| e.same_place(&cause.effect))
             else {
@@ -177,6 +183,9 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
                     // The other effects in the model keep the parameters plausible without this cause: only predicted motion can be evidence for it.
                     cause.ground = Ground::Motion;
                 }
+                let beside_law =
+                    |law: &LawBeside| (self.cost_with(&taken_out, &law.law, &last.weights) - law.cost) / rest;
+                cause.evidence.gain_beside = best_beside.map(beside_law);
                 let effect = &model.hypothesis.effects[place];
                 let rival = || self.rival_cost(&taken_out, &[*effect], &besides, &last.weights);
                 let rival = has_rivals.then(rival).flatten();
@@ -290,6 +299,7 @@ mod tests {
         Evidence {
             selected: 1.0,
             gain: Some(gain),
+            gain_beside: None,
             gain_sigma: None,
             rival_gain: None,
             size_ratio: ratio,
@@ -358,6 +368,15 @@ mod tests {
         assert!((weighed.left_by_rival() - 0.5).abs() < 1e-12);
         weighed.leave_at_most(0.9);
         assert!((weighed.left_by_rival() - 0.5).abs() < 1e-12, "the better law counts");
+    }
+
+    #[test]
+    fn a_cause_that_a_law_makes_superfluous_is_improbable() {
+        let beside = |gain: f64| Evidence { gain_beside: Some(gain), ..evidence(2.0, None) }.probability();
+        let alone = evidence(2.0, None).probability();
+        assert_eq!(beside(3.0), alone, "a larger gain beside the law is no better evidence");
+        assert!(beside(0.5) < alone && beside(0.01) < 0.3 * alone);
+        assert_eq!(beside(-0.1), 0.0);
     }
 
     #[test]

@@ -50,14 +50,23 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     ) -> Vec<LawBeside> {
         let full = self.holdout_cost(weights, model);
         let rest = full - self.floor(weights);
-        let no_cause = [Vec::new(), Vec::new()];
         let forms = |torques: &[f64], own| with_two(TableForm::listed(torques, own), own, torques.len());
         let found = self.dependences(&model.hypothesis, Wanted { most: MAX_TABLES, rotary, forms: &forms });
         let fitted = found.into_iter().map(|law| {
-            let cost = self.cost_beside(&model.hypothesis, &law, &no_cause, weights);
+            let cost = self.cost_with(&model.hypothesis, &law, weights);
             LawBeside { law, cost }
         });
         fitted.filter(|beside| full - beside.cost > MATTERS * rest).collect()
+    }
+
+    /// Cost on the holdout of a model with the torques of the table `law` added, everything fitted again to the training logs.
+    pub(crate) fn cost_with(
+        &self,
+        model: &Hypothesis<P>,
+        law: &Dependence,
+        weights: &SplitWeighting<N>,
+    ) -> f64 {
+        self.cost_beside(model, law, &[Vec::new(), Vec::new()], weights)
     }
 
     /// Tables of a model's residual torque by inverse dynamics, strongest first, fitted to the training logs.
