@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from armgap import Arm, Log, simulate
 from armgap.check.drive_limit import slewed
-from armgap.diagnosis.laws_in_place import LawInPlace, doubt, laws_in_place, withheld
+from armgap.diagnosis.laws_in_place import LawInPlace, doubt, laws_in_place, say_withheld, withheld
 from armgap.report.pushes import times_of_pushes
 
 PERIOD = 0.002
@@ -93,6 +93,7 @@ def test_a_drive_of_limited_rate_passes_for_a_delay_and_pushes() -> None:
     tau = slewed(TIMES, command, np.array([12.0]))[0]
     log = simulate(PENDULUM, TIMES, tau[:, None], encoder=False)
     late = {"effect": "actuator_delay", "joint": 1, "probability": 0.9, "equivalents": []}
+    late |= {"parameters": {"delay": {"value": 0.01}}}
     causes = [late, pushed(1.0, 0.1)]
     (law,) = found(causes, command, log.q[:, 0])
     assert (law.name, law.throughout) == ("torque_rate_limit", True)
@@ -113,20 +114,36 @@ def test_pushes_that_all_act_against_the_motion_may_be_friction() -> None:
     signs = (-1, 1, -1, -1, 1, -1)
     pushes = [pushed(t, 0.2 * sign) for t, sign in zip(times, signs, strict=True)]
     (law,) = found(pushes, tau, q)
-    assert (law.name, law.factor) == ("uneven_friction", 4.0 / 2**6)
-    assert found(pushes[:2], tau, q) == [], "two are no evidence"
+    assert (law.name, law.factor) == ("uneven_friction", 8.0 / 2**6)
+    assert found(pushes[:3], tau, q) == [], "three are no evidence"
     assert found([pushed(t, 0.2) for t in times], tau, q) == [], "in either direction"
     sizes = (0.2, 0.28, 0.23, 0.17, 0.25, 0.21)
     resisting = [pushed(t, size * sign) for t, size, sign in zip(times, sizes, signs, strict=True)]
     assert found(resisting, tau, q) == [], "somebody who holds against the motion"
+    assert [entry[0] for entry in withheld({"causes": pushes}, [law])] == ["external_pulse"]
     data = {"causes": pushes[:4]}
     (law,) = found(pushes[:4], tau, q)
     doubt(data, [law])
-    assert [c["probability"] for c in data["causes"]] == pytest.approx(4 * [0.9 * 0.25])
-    faint = [pushed(0.4, -0.2, probability=0.5), pushed(2.0, 0.2), pushed(3.7, -0.2)]
-    (law,) = found(faint, tau, q)
-    assert withheld({"causes": faint}, [law]) == [], "the most probable push keeps 0.45"
+    assert [c["probability"] for c in data["causes"]] == pytest.approx(4 * [0.9 * 0.5])
+    strong = [pushed(0.4, -0.2, probability=0.4), *pushes[1:4]]
+    for push in strong[1:]:
+        push["probability"] = 0.9
+    (law,) = found(strong, tau, q)
+    assert withheld({"causes": strong}, [law]) == [], "the most probable push keeps 0.45"
+    for push in pushes[:4]:
+        push["probability"] *= 0.5
     assert times_of_pushes(data["causes"]).endswith(
         "Those on joint 1 look like uneven friction: repeat the motion, and it comes back."
     )
     assert "repeat the motion" not in times_of_pushes([pushed(1.0, -0.2)])
+
+
+def test_a_law_in_place_of_pushes_is_said_and_is_no_matter_of_values() -> None:
+    apart = [("external_pulse", 1, "a drive does the same"), ("actuator_lag", 1, "a drive does the same")]
+    data: dict[str, Any] = {"causes": [], "candidates": [pushed(1.0, 0.2)], "verdict": "parameters", "notes": ["given"]}
+    say_withheld(data, apart)
+    assert data["notes"] == ["given", "no push, lag or delay of joint 1 is named: a drive does the same"]
+    assert data["verdict"] == "unexplained"
+    other: dict[str, Any] = {"causes": [], "candidates": [], "verdict": "parameters", "notes": []}
+    say_withheld(other, apart)
+    assert (other["notes"], other["verdict"]) == ([], "parameters"), "nothing was found to be withheld"

@@ -20,7 +20,7 @@ from armgap import _native
 from armgap.arm.arm import Arm
 from armgap.log.log import Log
 
-__all__ = ["CUTOFF", "FEWEST_ROWS", "EquationError", "Fit", "Rows", "bounds", "position_noise"]
+__all__ = ["CUTOFF", "FEWEST_ROWS", "EquationError", "Fit", "Mask", "Rows", "bounds", "position_noise"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -31,7 +31,7 @@ from armgap.diagnosis.equivalents import (
     low_pass,
     torque_loop,
 )
-from armgap.diagnosis.laws_in_place import doubt, laws_in_place, withheld
+from armgap.diagnosis.laws_in_place import doubt, laws_in_place, say_withheld, withheld
 from armgap.diagnosis.prepared_input import PreparedInput, prepare, refused
 from armgap.diagnosis.result import Diagnosis
 from armgap.diagnosis.serial_settings import serial_settings
@@ -181,6 +181,7 @@ def _diagnose(given: PreparedInput, settings: dict[str, Any], effects: Sequence[
         data = _contradicted(data)
     data["arm"]["name"] = arm.name
     doubt(data, instead)
+    say_withheld(data, settings.get("withheld", ()))
     for cause in (*data["causes"], *data["candidates"]):
         if "log" in cause:
             cause["log"] = _WHOLE.sub("", cause["log"])

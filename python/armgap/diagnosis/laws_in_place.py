@@ -21,13 +21,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armgap.arm.arm import Arm
-from armgap.check.drive_limit import LIMITED, slewed
-from armgap.check.equation_error import FEWEST_ROWS, EquationError, Rows, bounds
+from armgap.check.drive_limit import LIMITED, TAKEN, slewed
+from armgap.check.equation_error import FEWEST_ROWS, EquationError, Mask, Rows, bounds
 from armgap.diagnosis.equivalents import beside
 from armgap.evidence.hypothesis import EffectInstance, delivered
 from armgap.log.log import Log
 
-__all__ = ["LawInPlace", "doubt", "laws_in_place", "withheld"]
+__all__ = ["LawInPlace", "doubt", "laws_in_place", "say_withheld", "withheld"]
 
 Array = NDArray[np.float64]
 
@@ -40,13 +40,15 @@ NAMEABLE = 0.3
 #: Probability of a push beside a law of the drive that explains it, as a part of its probability without it, for every push on the joint: pushes come
 #: at any time.
 _AS_LIKELY = 0.5
-#: Factor on the chance that as many pushes act against the motion: fewer than four pushes are not withheld for their direction.
-_SEVERAL = 4.0
+#: Factor on the chance that as many pushes act against the motion: three pushes are not doubted for that, and four not withheld.
+_SEVERAL = 8.0
 #: Median deviation of the pushes' mean torques, relative to their median, up to which they have one torque. In rough ranges of six simulated bearings
 #: of another hand it was 0.01 or 0.02; of four and more pushes on four arms, which all happened to act against the motion, 0.07 to 0.15.
 _SAME_TORQUE = 0.05
 #: Part of the mean speed within a push that its mean velocity must have for the push to act with or against the motion.
 _IN_ONE_DIRECTION = 0.5
+#: Time constants of the filters for which rows of the equation of motion remember a push.
+_FILTER_MEMORY = 4.0
 #: Shortest half width of the stretch around a push in which a law's impulse is taken [s].
 _REACH_S = 0.03
 #: Time over which velocities are averaged [s].
@@ -146,9 +148,10 @@ def laws_in_place(data: dict[str, Any], logs: Sequence[Log], arm: Arm) -> list[L
         causes = [c for c in data["causes"] if joint in (c.get("joints") or [c["joint"]])]
         pushes = [c for c in causes if c.get("log") in names]
         late = any(c["effect"] in _LATE for c in causes)
-        law = _by_equation(logs, arm, joint) if pushes or late else None
+        law = _by_equation(causes, logs, arm, joint) if pushes or late else None
         if law is None and pushes:
-            behind = [_behind(log, causes, joint) for log in logs]
+            # What a law takes, it takes behind the limits that are named.
+            behind = [_behind(log, causes, joint, _LIMITS_NAMED) for log in logs]
             law = _by_impulses(pushes, behind, arm, joint) or _by_direction(pushes, logs, arm, joint)
         if law is not None:
             found.append(law)
@@ -182,6 +185,18 @@ def withheld(data: dict[str, Any], laws: Sequence[LawInPlace]) -> list[tuple[str
     return apart if any(_named(data, effect, joint) for effect, joint, _ in apart if joint is not None) else []
 
 
+def say_withheld(data: dict[str, Any], apart: Sequence[tuple[str, int | None, str]]) -> None:
+    """Add what is in the place of withheld causes to the notes; without a named cause such a law is what no effect explains."""
+    found = {(c["effect"], c["joint"]) for c in data["candidates"]}
+    said = {(joint, why) for effect, joint, why in apart if (effect, joint) in found}
+    data["notes"] = [
+        *data["notes"],
+        *(f"no push, lag or delay of joint {joint} is named: {why}" for joint, why in sorted(said)),
+    ]
+    if said and not data["causes"] and data["verdict"] in ("none", "parameters"):
+        data["verdict"] = "unexplained"
+
+
 def _named(data: dict[str, Any], effect: str, joint: int) -> bool:
     """Whether a diagnosis names an effect, or pushes, on a joint."""
     return any(cause["effect"] == effect and cause["joint"] == joint for cause in data["causes"])
@@ -195,8 +210,11 @@ def _unit(arm: Arm, joint: int) -> str:
     return "N m" if arm.rotary_joints[joint - 1] else "N"
 
 
-def _by_equation(logs: Sequence[Log], arm: Arm, joint: int) -> LawInPlace | None:
-    """Return the law of the drive behind which the equation of motion leaves hardly any of a joint's unexplained torque; None if there is none."""
+def _by_equation(causes: Sequence[dict[str, Any]], logs: Sequence[Log], arm: Arm, joint: int) -> LawInPlace | None:
+    """Return the law of the drive behind which the equation of motion leaves hardly any of a joint's unexplained torque, and less than the causes do.
+
+    The causes on the joint leave what is unexplained outside of the pushes, with the torque that lags and delays deliver. None without such a law.
+    """
     j = joint - 1
     rows = [Rows.of(log, arm) for log in logs]
     moving = [r.moving(log) for r, log in zip(rows, logs, strict=True)]
@@ -205,35 +223,45 @@ def _by_equation(logs: Sequence[Log], arm: Arm, joint: int) -> LawInPlace | None
         return None
     low, high = bounds(arm)
 
-    def unexplained(torques: Sequence[Array] | None) -> float:
-        errors = base
-        if torques is not None:
-            changed = zip(rows, moving, logs, torques, strict=True)
-            errors = base.with_rows([r.with_torque(log, j, x).within(mask) for r, mask, log, x in changed], j)
+    def unexplained(torques: Sequence[Array], masks: Sequence[Mask] = moving) -> float:
+        changed = zip(rows, masks, logs, torques, strict=True)
+        errors = EquationError([r.with_torque(log, j, x).within(mask) for r, mask, log, x in changed], arm)
         return float(errors.fit(low, high).share[j] * errors.scale[j])
 
-    whole = unexplained(None)
+    whole = max(unexplained([log.tau[:, j] for log in logs]), 1e-30)
+    delivers = [_behind(log, causes, joint, _LATE).tau[:, j] for log in logs]
+    left_by_causes = unexplained(
+        delivers, [mask & _outside(log, r, causes)[:, None] for mask, log, r in zip(moving, logs, rows, strict=True)]
+    )
     laws = (
-        (
-            name,
-            values,
-            unexplained([log.tau[:, j] + x for log, x in zip(logs, missing, strict=True)]) / max(whole, 1e-30),
-        )
+        (name, values, unexplained([log.tau[:, j] + x for log, x in zip(logs, missing, strict=True)]))
         for name, values, missing in (*_rates(logs, j), *_falling(logs, j, _STALL[::2], _FALL[2::2]))
     )
     name, values, left = min(laws, key=lambda law: law[2], default=("", (), np.inf))
-    if left >= LIMITED:
+    if left >= min(LIMITED * whole, TAKEN * left_by_causes):
         return None
-    said = f"{_in_words(name, values, arm, joint)}: behind it {left:.1%} of the joint's unexplained torque is left, and it comes back with the motion"
-    return LawInPlace(name, joint, said, left, throughout=True)
+    words = _in_words(name, values, arm, joint)
+    said = f"{words}: behind it {left / whole:.1%} of the joint's unexplained torque is left, and it comes back with the motion"
+    return LawInPlace(name, joint, said, left / whole, throughout=True)
 
 
-def _behind(log: Log, causes: Sequence[dict[str, Any]], joint: int) -> Log:
-    """Return a log with the torque of one joint that its named limits deliver: what another law of the drive takes, it takes behind these."""
+def _outside(log: Log, rows: Rows, causes: Sequence[dict[str, Any]]) -> Mask:
+    """Return a mask of the rows of a log that remember none of its pushes."""
+    t = log.t[rows.samples]
+    outside = np.ones(len(t), dtype=bool)
+    for cause in causes:
+        if cause.get("log") == log.name:
+            time, duration = (float(cause["parameters"][key]["value"]) for key in ("time", "duration"))
+            outside &= (t < time - 0.5 * duration) | (t > time + 0.5 * duration + _FILTER_MEMORY / rows.cutoff)
+    return outside
+
+
+def _behind(log: Log, causes: Sequence[dict[str, Any]], joint: int, effects: Sequence[str]) -> Log:
+    """Return a log with the torque of one joint that the drive delivers with those of the named `effects` that act on it."""
     named = [
         EffectInstance(c["effect"], joint, {name: p["value"] for name, p in c["parameters"].items()})
         for c in causes
-        if c["effect"] in _LIMITS_NAMED and c["joint"] == joint
+        if c["effect"] in effects
     ]
     return replace(log, tau=delivered(log.t, log.tau, named)) if named else log
 
