@@ -192,9 +192,10 @@ def _diagnose(given: PreparedInput, settings: dict[str, Any], effects: Sequence[
     low_pass(data, given.checks)
     torque_loop(data)
     encoder_scale(data, (*training, *held))
-    center_of_mass(data, arm)
-    gear_losses(data)
-    common_gain(data)
+    if arm.chain is None:
+        center_of_mass(data, arm)
+        gear_losses(data)
+        common_gain(data)
     data["checks"] = [check.to_dict() for check in checks]
     known, corrected_logs = tables.applied(data, (*training, *held))
     count = len(training)

@@ -87,7 +87,7 @@ def center_of_mass(data: dict[str, Any], arm: Arm) -> None:
 
     Both turn the terms of gravity and of coupling by one angle, in which the last link's angle stands alone.
     """
-    if arm.chain is not None or not all(arm.rotary_joints) or len(arm.gravity_parameters) == 0:
+    if not all(arm.rotary_joints) or len(arm.gravity_parameters) == 0:
         return
     why = "the last link's centre of mass beside its axis turns the same torques by the same angle; a reading at a known position tells them apart"
     for cause in data["causes"]:
@@ -96,7 +96,7 @@ def center_of_mass(data: dict[str, Any], arm: Arm) -> None:
 
 
 def gear_losses(data: dict[str, Any]) -> None:
-    """Add a gear that loses torque in both directions of power to the equivalents of a torque gain beside a gear efficiency.
+    """Add a gear that loses torque in both directions of power to the equivalents of a torque gain beside a gear efficiency of a planar arm.
 
     Friction of ``mu`` times the transmitted torque leaves ``tau / (1 + mu)`` of the motor's torque while it drives and ``tau / (1 - mu)`` while it
     brakes: a gain of ``1 / (1 - mu)`` and, beside it, a loss of ``2 mu / (1 + mu)`` while driving.
@@ -123,7 +123,7 @@ def gear_losses(data: dict[str, Any]) -> None:
 
 
 def common_gain(data: dict[str, Any]) -> None:
-    """Add a common factor of all torques to the equivalents of a payload that explains the arm's parameters no better.
+    """Add a common factor of all torques to the equivalents of a payload that explains a planar arm's parameters no better.
 
     A payload is told from the arm's other values by the arm file alone. Drives that all deliver less than they are commanded raise all parameters in
     proportion, at the cost of one value where a payload has two.
