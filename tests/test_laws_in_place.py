@@ -64,6 +64,8 @@ def test_a_law_of_the_drive_gives_the_impulses_of_all_pushes(name: str) -> None:
     assert law.factor == 0.5 ** len(pushes)
     apart = {effect for effect, joint, _ in withheld({"causes": pushes}, [law]) if joint == 1}
     assert apart == {"external_pulse", "actuator_lag", "actuator_delay"}, "no lag takes up what the pushes were"
+    stretches = [push | {"log": f"run ({2 * i} to {2 * i + 2} s)"} for i, push in enumerate(pushes)]
+    assert [other.name for other in found(stretches, tau, q)] == [name], "in stretches of the log"
     # Pushes of the same impulses at other times are no law's.
     for push in pushes:
         push["parameters"]["time"]["value"] += 0.37

@@ -31,7 +31,7 @@ from armgap.diagnosis.equivalents import (
     low_pass,
     torque_loop,
 )
-from armgap.diagnosis.laws_in_place import doubt, laws_in_place, say_withheld, withheld
+from armgap.diagnosis.laws_in_place import STRETCH, doubt, laws_in_place, say_withheld, withheld
 from armgap.diagnosis.prepared_input import PreparedInput, prepare, refused
 from armgap.diagnosis.result import Diagnosis
 from armgap.diagnosis.serial_settings import serial_settings
@@ -45,8 +45,6 @@ __all__ = ["InputSummary", "LogRemark", "diagnose"]
 
 #: Pattern of the suffixes that name a part or a stretch of a log, after the log's own name.
 _WHOLE = re.compile(r"( \((first|last) part\))?( \(\S+ to \S+ s\))?$")
-#: Pattern of the suffix that names a stretch of a log, after the log's own name.
-_STRETCH = re.compile(r" \(\S+ to \S+ s\)$")
 MOST_CAUSES = 1000
 """Largest number of causes that may be asked for: more than the library can name on any arm."""
 LogLike = Any  # a Log, a path, a pattern such as "logs/*.parquet", or a table
@@ -211,7 +209,7 @@ def _diagnose(given: PreparedInput, settings: dict[str, Any], effects: Sequence[
     data["input"] = _input(arm, training, held)
     data["provenance"] = given.provenance
     remarks: list[LogRemark] = [
-        {"log": _STRETCH.sub("", log.name), "kind": f.kind, "message": f.message}
+        {"log": STRETCH.sub("", log.name), "kind": f.kind, "message": f.message}
         for log in (*training, *held)
         for f in log.findings
     ]
@@ -244,7 +242,7 @@ def _input(arm: Arm, training: list[Log], held: list[Log]) -> InputSummary:
     sets: tuple[tuple[Literal["training", "holdout"], list[Log]], ...] = (("training", training), ("holdout", held))
     for use, logs in sets:
         for log in logs:
-            name = _STRETCH.sub("", log.name)
+            name = STRETCH.sub("", log.name)
             file = None if log.path is None else str(log.path)
             entry: InputLog = {
                 "name": name,

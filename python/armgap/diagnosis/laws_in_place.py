@@ -12,7 +12,8 @@ against three for every push:
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import re
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import comb
 from typing import Any
@@ -27,10 +28,12 @@ from armgap.diagnosis.equivalents import beside
 from armgap.evidence.hypothesis import EffectInstance, delivered
 from armgap.log.log import Log
 
-__all__ = ["LawInPlace", "doubt", "laws_in_place", "say_withheld", "withheld"]
+__all__ = ["STRETCH", "LawInPlace", "doubt", "laws_in_place", "say_withheld", "withheld"]
 
 Array = NDArray[np.float64]
 
+#: Pattern of the suffix that names a stretch of a log, after the log's own name.
+STRETCH = re.compile(r" \(\S+ to \S+ s\)$")
 #: Share of the pushes' squared impulses, those that the law gives elsewhere added, up to which a law of the drive explains the pushes. On simulated
 #: arms of another hand it was 0.001 to 0.36 for 14 of 18 such drives, and 0.67 or more for 47 pushes in 27 groups, 37 of them drawn after the test
 #: was made (docs/decisions/065-asked-once-more.md).
@@ -145,7 +148,7 @@ def laws_in_place(data: dict[str, Any], logs: Sequence[Log], arm: Arm) -> list[L
     names = {log.name for log in logs}
     found = []
     for joint in range(1, arm.n_joints + 1):
-        causes = [c for c in data["causes"] if joint in (c.get("joints") or [c["joint"]])]
+        causes = [_of_whole_log(c, names) for c in data["causes"] if joint in (c.get("joints") or [c["joint"]])]
         pushes = [c for c in causes if c.get("log") in names]
         late = any(c["effect"] in _LATE for c in causes)
         law = _by_equation(causes, logs, arm, joint) if pushes or late else None
@@ -156,6 +159,12 @@ def laws_in_place(data: dict[str, Any], logs: Sequence[Log], arm: Arm) -> list[L
         if law is not None:
             found.append(law)
     return found
+
+
+def _of_whole_log(cause: dict[str, Any], names: Collection[str]) -> dict[str, Any]:
+    """Return a cause with the name of a whole log in place of that of its stretch (``name (0.0 to 2.5 s)``), whose times are those of the log."""
+    name = cause.get("log")
+    return cause if name is None or name in names else cause | {"log": STRETCH.sub("", name)}
 
 
 def doubt(data: dict[str, Any], laws: Sequence[LawInPlace]) -> None:
