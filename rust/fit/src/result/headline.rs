@@ -95,16 +95,18 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             self.weighed_causes(&mut attribution, &disturbances, most, &naming);
         let pushes_allowed = if most > 0 { usize::MAX } else { 0 };
         disturbances.sort_by(|a, b| b.clarity().total_cmp(&a.clarity()));
+        let unfit = |e: &Disturbance| naming.unfit(&e.push, &e.sigma, e.probability);
+        let none_fit = disturbances.iter().all(|e| unfit(e).is_some());
         if !candidates.is_empty() && !disturbances.is_empty() {
             let left = self.left_by_unnamed(&attribution, &causes, &disturbances);
             for push in &mut disturbances {
                 push.doubt_beside(left);
             }
         }
-        let (disturbances, disturbance_candidates) =
-            sorted(disturbances, pushes_allowed, |e| naming.unfit(&e.push, &e.sigma, e.probability));
+        let (disturbances, disturbance_candidates) = sorted(disturbances, pushes_allowed, unfit);
         let mut changed = !disturbance_candidates.is_empty();
-        if let Some(alone) = alone.filter(|_| changed && disturbances.is_empty()) {
+        // Pushes that are only doubted beside what is not named leave nothing to the search that took their windows for the arm's motion.
+        if let Some(alone) = alone.filter(|_| changed && (none_fit || most == 0)) {
             attribution = alone;
             self.take_all_windows();
             self.set_pushes(&[]);
