@@ -31,7 +31,7 @@ from armgap.diagnosis.equivalents import (
     low_pass,
     torque_loop,
 )
-from armgap.diagnosis.laws_in_place import STRETCH, doubt, laws_in_place, say_withheld, withheld
+from armgap.diagnosis.laws_in_place import doubt, laws_in_place, say_withheld, withheld
 from armgap.diagnosis.prepared_input import PreparedInput, prepare, refused
 from armgap.diagnosis.result import Diagnosis
 from armgap.diagnosis.serial_settings import serial_settings
@@ -39,6 +39,7 @@ from armgap.errors import OptionError
 from armgap.evidence import consistency, laws, plausibility
 from armgap.log.conversion.unit_names import si
 from armgap.log.log import Log
+from armgap.log.stretches import STRETCH
 from armgap.progress import ProgressCallback, report_progress, use_callback
 
 __all__ = ["InputSummary", "LogRemark", "diagnose"]

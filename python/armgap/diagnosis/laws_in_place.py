@@ -12,8 +12,7 @@ against three for every push:
 
 from __future__ import annotations
 
-import re
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from math import comb
 from typing import Any
@@ -22,18 +21,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armgap.arm.arm import Arm
-from armgap.check.drive_limit import LIMITED, TAKEN, slewed
+from armgap.check.drive_limit import LIMITED, TAKEN
 from armgap.check.equation_error import FEWEST_ROWS, EquationError, Mask, Rows, bounds
+from armgap.diagnosis.drive_laws import WORDS, DriveLaw, all_laws, frequent_laws, speed
 from armgap.diagnosis.equivalents import beside
 from armgap.evidence.hypothesis import EffectInstance, delivered
 from armgap.log.log import Log
+from armgap.log.stretches import STRETCH
 
-__all__ = ["STRETCH", "LawInPlace", "doubt", "laws_in_place", "say_withheld", "withheld"]
+__all__ = ["LawInPlace", "doubt", "laws_in_place", "say_withheld", "withheld"]
 
 Array = NDArray[np.float64]
 
-#: Pattern of the suffix that names a stretch of a log, after the log's own name.
-STRETCH = re.compile(r" \(\S+ to \S+ s\)$")
 #: Share of the pushes' squared impulses, those that the law gives elsewhere added, up to which a law of the drive explains the pushes. On simulated
 #: arms of another hand it was 0.001 to 0.36 for 14 of 18 such drives, and 0.67 or more for 47 pushes in 27 groups, 37 of them drawn after the test
 #: was made (docs/decisions/065-asked-once-more.md).
@@ -54,51 +53,10 @@ _IN_ONE_DIRECTION = 0.5
 _FILTER_MEMORY = 4.0
 #: Shortest half width of the stretch around a push in which a law's impulse is taken [s].
 _REACH_S = 0.03
-#: Time over which velocities are averaged [s].
-_SPEED_S = 0.01
-#: Times that a drive needs for the range of its commands at the rates that are tried [s].
-_SLEW_TIMES = tuple(0.01 * 1.25**k for k in range(31))
-#: Quantiles of the size of the torque at which thresholds are tried, and limits of either direction.
-_THRESHOLDS = (*np.arange(0.005, 0.05, 0.005), *np.arange(0.05, 0.6, 0.02))
-_LIMITS = (0.5, 0.6, 0.7, 0.8, 0.85, 0.9, 0.95, 0.975, 1.0)
-#: Torques at standstill, and their decrease up to the log's speeds, relative to the largest torque, of limits that fall with the speed.
-_STALL = (
-    0.3,
-    0.4,
-    0.5,
-    0.55,
-    0.6,
-    0.65,
-    0.7,
-    0.75,
-    0.8,
-    0.85,
-    0.9,
-    0.95,
-    1.0,
-    1.05,
-    1.1,
-    1.2,
-    1.3,
-    1.5,
-    1.7,
-    2.0,
-    2.5,
-    3.0,
-    4.0,
-)
-_FALL = (0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0)
 #: Effects of the library that limit the torque of a drive.
 _LIMITS_NAMED = ("torque_saturation", "torque_dead_zone")
 #: Causes that a limited drive resembles besides pushes.
 _LATE = ("actuator_lag", "actuator_delay")
-#: What each law of a drive is, in words, by its name in results.
-_WORDS = {
-    "torque_rate_limit": "a drive whose torque changes by at most {:.3g} {}/s does the same",
-    "torque_speed_limit": "a limit of the torque that falls with the speed, as by the supply voltage, does the same",
-    "torque_threshold": "a drive that delivers nothing below {:.3g} {} does the same",
-    "torque_asymmetric_limit": "a drive with limits of {:.3g} and -{:.3g} {} does the same",
-}
 
 
 @dataclass(frozen=True)
@@ -183,7 +141,7 @@ def withheld(data: dict[str, Any], laws: Sequence[LawInPlace]) -> list[tuple[str
     """
     found: dict[tuple[str, int | None], tuple[float, str]] = {}
     for law in laws:
-        if law.name in _WORDS:
+        if law.name in WORDS:
             # Without the pushes a lag or delay would take up what such a drive does.
             found |= {(effect, law.joint): (0.0, law.why) for effect in _LATE if not _named(data, effect, law.joint)}
         for cause in data["causes"]:
@@ -211,8 +169,10 @@ def _named(data: dict[str, Any], effect: str, joint: int) -> bool:
     return any(cause["effect"] == effect and cause["joint"] == joint for cause in data["causes"])
 
 
-def _in_words(name: str, values: Sequence[float], arm: Arm, joint: int) -> str:
-    return _WORDS[name].format(*values, _unit(arm, joint))
+def _values(push: dict[str, Any]) -> tuple[float, float, float]:
+    """Return time [s], duration [s] and impulse [N m s or N s] of a push."""
+    time, duration, impulse = (float(push["parameters"][key]["value"]) for key in ("time", "duration", "impulse"))
+    return time, duration, impulse
 
 
 def _unit(arm: Arm, joint: int) -> str:
@@ -232,26 +192,28 @@ def _by_equation(causes: Sequence[dict[str, Any]], logs: Sequence[Log], arm: Arm
         return None
     low, high = bounds(arm)
 
-    def unexplained(torques: Sequence[Array], masks: Sequence[Mask] = moving) -> float:
-        changed = zip(rows, masks, logs, torques, strict=True)
-        errors = EquationError([r.with_torque(log, j, x).within(mask) for r, mask, log, x in changed], arm)
+    def unexplained(errors: EquationError) -> float:
         return float(errors.fit(low, high).share[j] * errors.scale[j])
 
-    whole = max(unexplained([log.tau[:, j] for log in logs]), 1e-30)
+    def with_torques(torques: Sequence[Array], masks: Sequence[Mask]) -> list[Rows]:
+        changed = zip(rows, masks, logs, torques, strict=True)
+        return [r.with_torque(log, j, x).within(mask) for r, mask, log, x in changed]
+
+    def behind(law: DriveLaw) -> float:
+        torques = [log.tau[:, j] + x for log, x in zip(logs, law.added, strict=True)]
+        return unexplained(base.with_rows(with_torques(torques, moving), j))
+
+    whole = max(unexplained(base), 1e-30)
+    outside = [mask & _outside(log, r, causes)[:, None] for mask, log, r in zip(moving, logs, rows, strict=True)]
     delivers = [_behind(log, causes, joint, _LATE).tau[:, j] for log in logs]
-    left_by_causes = unexplained(
-        delivers, [mask & _outside(log, r, causes)[:, None] for mask, log, r in zip(moving, logs, rows, strict=True)]
-    )
-    laws = (
-        (name, values, unexplained([log.tau[:, j] + x for log, x in zip(logs, missing, strict=True)]))
-        for name, values, missing in (*_rates(logs, j), *_falling(logs, j, _STALL[::2], _FALL[2::2]))
-    )
-    name, values, left = min(laws, key=lambda law: law[2], default=("", (), np.inf))
+    # Mean squares over all rows, of which those within pushes count as explained.
+    left_by_causes = unexplained(EquationError(with_torques(delivers, outside), arm))
+    left, law = min(((behind(law), law) for law in frequent_laws(logs, j)), key=lambda found: found[0])
     if left >= min(LIMITED * whole, TAKEN * left_by_causes):
         return None
-    words = _in_words(name, values, arm, joint)
+    words = law.in_words(_unit(arm, joint))
     said = f"{words}: behind it {left / whole:.1%} of the joint's unexplained torque is left, and it comes back with the motion"
-    return LawInPlace(name, joint, said, left / whole, throughout=True)
+    return LawInPlace(law.name, joint, said, left / whole, throughout=True)
 
 
 def _outside(log: Log, rows: Rows, causes: Sequence[dict[str, Any]]) -> Mask:
@@ -260,7 +222,7 @@ def _outside(log: Log, rows: Rows, causes: Sequence[dict[str, Any]]) -> Mask:
     outside = np.ones(len(t), dtype=bool)
     for cause in causes:
         if cause.get("log") == log.name:
-            time, duration = (float(cause["parameters"][key]["value"]) for key in ("time", "duration"))
+            time, duration, _ = _values(cause)
             outside &= (t < time - 0.5 * duration) | (t > time + 0.5 * duration + _FILTER_MEMORY / rows.cutoff)
     return outside
 
@@ -279,13 +241,13 @@ def _by_impulses(pushes: Sequence[dict[str, Any]], logs: Sequence[Log], arm: Arm
     """Return the law of the drive that gives the impulses of the pushes on one joint and little elsewhere; None if there is none."""
     j = joint - 1
     index = {log.name: i for i, log in enumerate(logs)}
-    impulses = np.array([push["parameters"]["impulse"]["value"] for push in pushes])
+    impulses = np.array([_values(push)[2] for push in pushes])
     during: list[tuple[int, NDArray[np.bool_]]] = []
     free = [np.ones(len(log), dtype=bool) for log in logs]
     reach = []
     for push in pushes:
         i = index[push["log"]]
-        time, duration = (float(push["parameters"][key]["value"]) for key in ("time", "duration"))
+        time, duration, _ = _values(push)
         reach.append(max(duration, _REACH_S))
         mask = np.abs(logs[i].t - time) <= reach[-1]
         during.append((i, mask))
@@ -293,29 +255,21 @@ def _by_impulses(pushes: Sequence[dict[str, Any]], logs: Sequence[Log], arm: Arm
     width = 2.0 * float(np.median(reach))
     whole = float(np.sum(impulses**2))
 
-    def left(missing: Sequence[Array]) -> float:
-        given = np.array([np.sum(missing[i][mask]) * logs[i].sample_period for i, mask in during])
+    def left(added: Sequence[Array]) -> float:
+        given = np.array([np.sum(added[i][mask]) * logs[i].sample_period for i, mask in during])
         elsewhere = 0.0
-        for log, x, mask in zip(logs, missing, free, strict=True):
+        for log, x, mask in zip(logs, added, free, strict=True):
             count = max(round(width / log.sample_period), 1)
             sums = np.add.reduceat(np.where(mask, x, 0.0) * log.sample_period, np.arange(0, len(x), count))
             elsewhere += float(np.sum(sums**2))
         return (float(np.sum((impulses - given) ** 2)) + elsewhere) / whole
 
-    laws = (
-        (name, values, left(missing))
-        for name, values, missing in (
-            *_rates(logs, j),
-            *_thresholds(logs, j),
-            *_falling(logs, j, _STALL, _FALL),
-            *_two_limits(logs, j),
-        )
-    )
-    name, values, share = min(laws, key=lambda law: law[2])
+    share, law = min(((left(law.added), law) for law in all_laws(logs, j)), key=lambda found: found[0])
     if share >= LEFT_OF_IMPULSES:
         return None
-    said = f"{_in_words(name, values, arm, joint)} at the times of the pushes and hardly anything elsewhere, and comes back with the motion"
-    return LawInPlace(name, joint, said, _AS_LIKELY ** len(pushes))
+    words = law.in_words(_unit(arm, joint))
+    said = f"{words} at the times of the pushes and hardly anything elsewhere, and comes back with the motion"
+    return LawInPlace(law.name, joint, said, _AS_LIKELY ** len(pushes))
 
 
 def _by_direction(pushes: Sequence[dict[str, Any]], logs: Sequence[Log], arm: Arm, joint: int) -> LawInPlace | None:
@@ -324,10 +278,10 @@ def _by_direction(pushes: Sequence[dict[str, Any]], logs: Sequence[Log], arm: Ar
     against, torques = [], []
     for push in pushes:
         log = by_name[push["log"]]
-        time, duration, impulse = (float(push["parameters"][key]["value"]) for key in ("time", "duration", "impulse"))
-        speed = _speed(log, joint - 1)[np.abs(log.t - time) <= 0.5 * duration]
-        if len(speed) and abs(speed.mean()) > _IN_ONE_DIRECTION * np.abs(speed).mean():
-            against.append(impulse * speed.mean() < 0.0)
+        time, duration, impulse = _values(push)
+        velocity = speed(log, joint - 1)[np.abs(log.t - time) <= 0.5 * duration]
+        if len(velocity) and abs(velocity.mean()) > _IN_ONE_DIRECTION * np.abs(velocity).mean():
+            against.append(impulse * velocity.mean() < 0.0)
             torques.append(abs(impulse) / duration)
     count, opposed = len(against), sum(against)
     # Probability that as many of the pushes or more act against the motion.
@@ -338,57 +292,3 @@ def _by_direction(pushes: Sequence[dict[str, Any]], logs: Sequence[Log], arm: Ar
     torque = f"{middle:.3g} {_unit(arm, joint)}"
     said = f"{opposed} of {count} pushes on the joint act against its motion, with {torque} each, as friction does that rises in places"
     return LawInPlace("uneven_friction", joint, said, chance)
-
-
-Law = tuple[str, tuple[float, ...], list[Array]]
-
-
-def _rates(logs: Sequence[Log], j: int) -> Iterator[Law]:
-    """Yield limits of the rate of torque, with the torque that each adds to the command."""
-    tau = [log.tau[:, j] for log in logs]
-    rates = max(float(np.ptp(x)) for x in tau) / np.array(_SLEW_TIMES)
-    behind = [slewed(log.t, x, rates) for log, x in zip(logs, tau, strict=True)]
-    for k, rate in enumerate(rates):
-        yield "torque_rate_limit", (float(rate),), [x[k] - command for x, command in zip(behind, tau, strict=True)]
-
-
-def _thresholds(logs: Sequence[Log], j: int) -> Iterator[Law]:
-    """Yield thresholds below which a drive delivers nothing, with the torque that each adds to the command."""
-    tau = [log.tau[:, j] for log in logs]
-    for level in np.unique(np.quantile(np.abs(np.concatenate(tau)), _THRESHOLDS)):
-        yield "torque_threshold", (float(level),), [np.where(np.abs(x) < level, -x, 0.0) for x in tau]
-
-
-def _falling(logs: Sequence[Log], j: int, stall: Sequence[float], fall: Sequence[float]) -> Iterator[Law]:
-    """Yield limits that fall with the speed in the direction of the torque, with the torque that each adds to the command."""
-    tau = [log.tau[:, j] for log in logs]
-    speed = [_speed(log, j) for log in logs]
-    top = float(np.abs(np.concatenate(tau)).max())
-    fast = float(np.quantile(np.abs(np.concatenate(speed)), 0.99))
-    if top == 0.0 or fast == 0.0:
-        return
-    for slope in fall:
-        for level in stall:
-            limits = [
-                np.where(x * v > 0.0, np.maximum(level - slope * np.abs(v) / fast, 0.0) * top, np.inf)
-                for x, v in zip(tau, speed, strict=True)
-            ]
-            missing = [np.clip(x, -limit, limit) - x for x, limit in zip(tau, limits, strict=True)]
-            yield "torque_speed_limit", (level * top, slope * top / fast), missing
-
-
-def _two_limits(logs: Sequence[Log], j: int) -> Iterator[Law]:
-    """Yield limits that differ by direction, with the torque that each adds to the command."""
-    tau = [log.tau[:, j] for log in logs]
-    whole = np.concatenate(tau)
-    if whole.max() <= 0.0 or whole.min() >= 0.0:
-        return
-    for up in np.quantile(whole[whole > 0.0], _LIMITS):
-        for down in np.quantile(-whole[whole < 0.0], _LIMITS):
-            yield "torque_asymmetric_limit", (float(up), float(down)), [np.clip(x, -down, up) - x for x in tau]
-
-
-def _speed(log: Log, j: int) -> Array:
-    """Return the velocity of joint `j` (from 0), averaged over `_SPEED_S`."""
-    width = max(round(_SPEED_S / log.sample_period), 1)
-    return np.convolve(np.gradient(log.q[:, j], log.t), np.full(width, 1.0 / width), "same")

@@ -9,6 +9,7 @@ contents, so that rare cells are preferred to frequent ones; motion within a sen
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -19,13 +20,16 @@ from numpy.typing import NDArray
 from armgap.log.findings import Finding
 from armgap.log.log import Log
 
-__all__ = ["BUDGET", "STRETCH_S", "choose"]
+__all__ = ["BUDGET", "STRETCH", "STRETCH_S", "choose"]
 
 BUDGET = 24_000
 """Largest number of samples of all training logs, or of all holdout logs, that are diagnosed whole; of longer logs stretches are chosen."""
 
 STRETCH_S = 2.0
 """Length of a stretch of a long log [s]."""
+
+STRETCH = re.compile(r" \(\S+ to \S+ s\)$")
+"""Pattern of the suffix that names a stretch of a log, after the log's own name."""
 
 _MIN_STRETCHES = 4  # number of stretches that a budget holds at least, whatever their length
 _POSITIONS = 12

@@ -43,10 +43,9 @@ pub(crate) struct Naming<'a, const N: usize> {
 impl<const N: usize> Naming<'_, N> {
     /// Why an effect found with `probability`, whose values have standard deviations `sigma`, is not to be named; none if it may be.
     pub fn unfit(&self, effect: &EffectInstance, sigma: &[f64], probability: f64) -> Option<String> {
-        if probability < NAMEABLE {
-            return Some(format!("its probability is {probability:.2}"));
-        }
-        self.wrong_form(effect, probability).or_else(|| uncertain(effect, sigma))
+        improbable(probability)
+            .or_else(|| self.wrong_form(effect, probability))
+            .or_else(|| uncertain(effect, sigma))
     }
 
     /// Why a cause with the values and standard deviations of a model is not to be named `beside` the others; none if it may be.
@@ -56,8 +55,7 @@ impl<const N: usize> Naming<'_, N> {
         cause: &Cause,
         beside: &[Cause],
     ) -> Option<String> {
-        self.unfit(&cause.effect, &sigma_at_its_shape(model, cause), cause.probability)
-            .or_else(|| opposed(cause, beside))
+        improbable(cause.probability).or_else(|| self.no_effect(model, cause, beside))
     }
 
     /// Why a cause has values that no arm has, a form that the logs do not show, or a size that is not told from none, whatever its probability; none if
@@ -80,6 +78,10 @@ impl<const N: usize> Naming<'_, N> {
             .or_else(|| impossible(effect, probability))
             .or_else(|| part_of_a_wave(effect, self.travel[effect.joint]))
     }
+}
+
+fn improbable(probability: f64) -> Option<String> {
+    (probability < NAMEABLE).then(|| format!("its probability is {probability:.2}"))
 }
 
 /// Reason why the value of an effect is one that no arm has (a gain beyond drives, a negative stiffness); none if the value is possible.
