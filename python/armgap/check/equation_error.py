@@ -186,7 +186,7 @@ class Fit:
         Estimated parameters [SI].
     share : ndarray, shape (n_joints,)
         Mean square of each joint's residual, relative to that of its torque or of the largest term of its equation of motion, whichever is
-        larger; of `EquationError.with_factors` and `EquationError.of_torques` relative to that of the torque in any case.
+        larger; of `EquationError.with_factors`, `with_load` and `of_torques` relative to that of the torque in any case.
     """
 
     theta: Array
@@ -245,6 +245,15 @@ class EquationError:
         square = self.square * factors**2
         return self._solve(low, high, self.moment * factors[:, None], square, np.maximum(square, 1e-30))
 
+    def with_load(self, low: Array, high: Array, change: Array) -> Fit:
+        """Return the fit with any positive multiple of `change` added to parameters between `low` and `high`; shares as of `with_factors`."""
+        scale = np.maximum(self.square, 1e-30)
+        parts = np.column_stack([np.eye(len(change)), change])
+        gram = parts.T @ np.einsum("jil,j->il", self.gram, 1.0 / scale) @ parts
+        right = parts.T @ (self.moment / scale[:, None]).sum(axis=0)
+        theta = parts @ _native.bounded_least_squares(gram, right, np.append(low, 0.0), np.append(high, np.inf))
+        return Fit(theta, self._left(theta, self.moment, self.square) / scale)
+
     def of_torques(self, fit: Fit) -> Fit:
         """Return the fit with its unexplained shares relative to the torques alone, not to the largest term of the equation of motion."""
         return replace(fit, share=fit.share * self.scale / np.maximum(self.square, 1e-30))
@@ -252,8 +261,12 @@ class EquationError:
     def _solve(self, low: Array, high: Array, moment: Array, square: Array, scale: Array) -> Fit:
         gram = np.einsum("jil,j->il", self.gram, 1.0 / scale)
         theta = _native.bounded_least_squares(gram, (moment / scale[:, None]).sum(axis=0), low, high)
+        return Fit(theta, self._left(theta, moment, square) / scale)
+
+    def _left(self, theta: Array, moment: Array, square: Array) -> Array:
+        """Return per joint the mean square of the torque that parameters leave unexplained."""
         left = square - 2.0 * moment @ theta + np.einsum("i,jil,l->j", theta, self.gram, theta)
-        return Fit(theta, np.maximum(left, 0.0) / scale)
+        return np.asarray(np.maximum(left, 0.0))
 
     def with_rows(self, rows: Sequence[Rows], joint: int) -> EquationError:
         """Return the equation error of rows that differ in the torques of one joint (from 0) alone."""

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from armgap.arm.arm import Arm
 from armgap.arm.corrections import Corrections
+from armgap.arm.load import last_length, payload_change
 from armgap.check.check import Check, Severity
 from armgap.check.drive_limit import (
     LIMITED,
@@ -28,7 +29,7 @@ from armgap.check.drive_limit import (
     limited,
 )
 from armgap.check.elastic import beside_elasticity
-from armgap.check.equation_error import EquationError, bounds
+from armgap.check.equation_error import EquationError, Fit, bounds
 from armgap.log.log import Log
 from armgap.several_joints import by_joint
 
@@ -52,6 +53,9 @@ _CLEAR_GAIN = 0.5
 _MAX_UNEXPLAINED_SHARE = 0.3
 # Standard deviations of the arm file beyond which friction is not that of the arm file.
 _SURE = 3.0
+# Distances of a payload from the last axis that are tried: the largest, in lengths of the last link, and their number.
+_FURTHEST_LOAD = 2.0
+_LOAD_DISTANCES = 17
 # Share of unexplained torque below which a factor is exact: remaining errors are those of the arm file's parameters.
 _EXACT_FACTOR_SHARE = 1e-3
 
@@ -99,7 +103,11 @@ def find(base: EquationError, logs: Sequence[Log], arm: Arm) -> Factors | None:
     fit = base.with_factors(low, high, applied)
     gain = base.with_factors(low, high, np.ones_like(applied)).cost - fit.cost
     scaled = shared and _within(applied[0], _SCALED)
-    if gain < (0.0 if scaled else _GAIN_IN_COST) or (scaled and _friction_stands(base, arm, applied[0])):
+    if gain < (0.0 if scaled else _GAIN_IN_COST) or (scaled and _friction_stands(base, arm, applied)):
+        return None
+    loaded = min(_loaded(base, arm, low, high), key=lambda loaded: loaded.closeness)
+    logged, other = _friction_distance(loaded, arm, applied)
+    if loaded.closeness <= fit.closeness and np.sum(logged**2) <= np.sum(other**2):
         return None
     if min(limited(stands, logs, j)[1].closeness for j in odd) < fit.closeness:
         return None
@@ -108,16 +116,30 @@ def find(base: EquationError, logs: Sequence[Log], arm: Arm) -> Factors | None:
     return Factors(corrections, fit.closeness, tuple(checks), doubtful)
 
 
-def _friction_stands(base: EquationError, arm: Arm, factor: float) -> bool:
+def _friction_stands(base: EquationError, arm: Arm, factors: NDArray[np.float64]) -> bool:
     """Return whether friction agrees with the arm file in the torques as logged and disagrees in the scaled torques.
 
     A payload scales inertias and weights only, another unit of the torques scales friction too.
     """
-    b = arm.n_inertial
-    friction = base.fit(*bounds(arm)).theta[b:]
-    sigma = np.maximum(arm.sigma[b:], np.finfo(float).tiny)
-    logged, scaled = (np.abs((x - arm.theta[b:]) / sigma) for x in (friction, factor * friction))
+    logged, scaled = _friction_distance(base.fit(*bounds(arm)), arm, factors)
     return bool(logged.max() <= _SURE and np.sum(scaled**2) - np.sum(logged**2) > _SURE**2)
+
+
+def _friction_distance(
+    as_logged: Fit, arm: Arm, factors: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the distances of the friction coefficients of a fit from the arm file's [standard deviations], as they are and times the factors."""
+    b = arm.n_inertial
+    friction = as_logged.theta[b:]
+    sigma = np.maximum(arm.sigma[b:], np.finfo(float).tiny)
+    logged, scaled = (np.abs((x - arm.theta[b:]) / sigma) for x in (friction, np.tile(factors, 2) * friction))
+    return logged, scaled
+
+
+def _loaded(base: EquationError, arm: Arm, low: NDArray[np.float64], high: NDArray[np.float64]) -> list[Fit]:
+    """Return the fits to the torques as logged of the arm with a payload of any mass, one for each of some distances along the last link."""
+    distances = np.linspace(0.0, _FURTHEST_LOAD * last_length(arm), _LOAD_DISTANCES)
+    return [base.with_load(low, high, payload_change(arm, 1.0, float(distance))) for distance in distances]
 
 
 def _common(factors: NDArray[np.float64], share: NDArray[np.float64]) -> float:

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armgap import _native
 from armgap.arm.arm import Arm
+from armgap.arm.load import payload_change
 from armgap.arm.rigid_body import about_axis, about_origin
 from armgap.arm.serial.chain import JointKind, SerialChain
 from armgap.diagnosis.result import Cause, Value
@@ -154,7 +154,8 @@ def correct_planar(
     """Make a corrected model from the estimated parameters and causes of a planar arm; see `armgap.correct`."""
     theta, tilt = np.array([v.value for v in values]), 0.0
     for cause in causes:
-        theta = theta + _payload(arm, cause)
+        if cause.effect == "payload":
+            theta = theta + payload_change(arm, value(cause, "mass"), value(cause, "distance"))
         tilt += value(cause, "angle") if cause.effect == "base_tilt" else 0.0
     if arm.kind == "axis":
         theta[1] = theta[1] * math.cos(tilt) + theta[0] * arm.gravity * math.sin(tilt)
@@ -176,28 +177,6 @@ def correct_planar(
         tilt,
         unbuildable,
     )
-
-
-def _payload(arm: Arm, cause: Cause) -> Array:
-    """Return the change of the base parameters by a payload [SI]."""
-    change = np.zeros(len(arm.parameter_names))
-    if cause.effect != "payload":
-        return change
-    mass, distance, n = value(cause, "mass"), value(cause, "distance"), arm.n_joints
-    masses, places, lengths = ([0.0] * (n - 1) + [x] for x in (mass, distance, 0.0))
-    if n > 1:
-        lengths[0] = _first_length(arm)
-    change[: arm.n_inertial] = _native.theta_from_links(arm.kind, arm.gravity, masses, lengths, places, [0.0] * n)
-    if arm.kind == "axis" and arm.theta[0] > 0:
-        change[1] = mass * arm.theta[1] / arm.theta[0]
-    return change
-
-
-def _first_length(arm: Arm) -> float:
-    """Return the length of link 1 [m] that the diagnosis assumed for the place of a payload."""
-    if arm.link_length is not None:
-        return float(arm.link_length[0])
-    return arm.gravity * float(arm.theta[1]) / float(arm.theta[4]) if arm.theta[4] > 0 else 0.0
 
 
 def _with_length(theta: Array, values: Sequence[Value], arm: Arm) -> tuple[Array, tuple[str, ...]]:
