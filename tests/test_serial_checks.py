@@ -73,6 +73,18 @@ def test_every_stretch_of_a_log_is_judged(quiet: list[Log], arm: Arm) -> None:
     assert (len(checks), len(corrections.skip)) == (2, 2)
 
 
+def test_a_torque_that_friction_holds_at_rest_was_recorded(quiet: list[Log], arm: Arm) -> None:
+    assert arm.chain is not None
+    rows = round(1.2 / PERIOD)
+    t, tau = torques(0, SECONDS)
+    tau[:rows] = [0.5 * arm.theta[12 * arm.n_joints], 0.0, 0.0]
+    held = simulate(arm, t, tau, noise=2e-6, tolerance=1e-8, name="held")
+    assert np.ptp(held.q[:rows, 0]) < 1e-3
+    assert find([held, *quiet[1:]], arm)[1] == []
+    tau[:rows, 0] *= 8.0
+    assert [check.joint for check in find([replace(held, tau=tau), *quiet[1:]], arm)[1]] == [1]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("joint", [1, 2])
 def test_a_torque_that_no_log_holds_is_no_cause(joint: int, quiet: list[Log], arm: Arm) -> None:

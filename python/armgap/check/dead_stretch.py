@@ -13,7 +13,17 @@ from armgap.check.drive_limit import deliver, delivered
 from armgap.check.equation_error import Array, EquationError, Mask, Rows, bounds
 from armgap.log.log import SIGNALS, Log
 
-__all__ = ["DEAD_SHARE", "MISFIT_RATIO", "Run", "constant_torques", "dead_check", "find", "merged", "without_constant"]
+__all__ = [
+    "DEAD_SHARE",
+    "MISFIT_RATIO",
+    "Run",
+    "beyond_friction",
+    "constant_torques",
+    "dead_check",
+    "find",
+    "merged",
+    "without_constant",
+]
 
 Run = tuple[int, int, int]
 """Joint (from 0), and the first and last sample of a stretch in which the joint's torque does not change."""
@@ -110,7 +120,8 @@ def _judged(log: Log, rows: Rows, arm: Arm, runs: list[Run], near: list[Run]) ->
     known = rows.at(alive)
     base = EquationError([known], arm)
     theta = base.fit(*bounds(arm)).theta
-    residual = _beyond_friction(rows.y - rows.psi @ theta, rows.moving(log), arm, theta)
+    coulomb = np.maximum(theta, arm.theta)[arm.n_inertial + arm.n_joints :]
+    residual = beyond_friction(rows.y - rows.psi @ theta, rows.moving(log), coulomb)
     checks = []
     for j, first, last in near:
         inside = dead[:, j] & (rows.samples >= first) & (rows.samples <= last)
@@ -122,9 +133,12 @@ def _judged(log: Log, rows: Rows, arm: Arm, runs: list[Run], near: list[Run]) ->
     return merged(checks)
 
 
-def _beyond_friction(residual: Array, moving: Mask, arm: Arm, theta: Array) -> Array:
-    """Return the residual torque beyond the friction that may hold a joint at rest: a controller that holds a joint gives it a constant torque."""
-    holding = _BREAKAWAY * np.maximum(theta, arm.theta)[arm.n_inertial + arm.n_joints :]
+def beyond_friction(residual: Array, moving: Mask, coulomb: Array | float) -> Array:
+    """Return the residual torque beyond the friction that may hold a joint at rest: a controller that holds a joint gives it a constant torque.
+
+    `moving` is True where the joint moves, `coulomb` its Coulomb friction [N m or N]; shapes broadcast to that of `residual`.
+    """
+    holding = _BREAKAWAY * coulomb
     return np.where(moving, residual, np.sign(residual) * np.maximum(np.abs(residual) - holding, 0.0))
 
 

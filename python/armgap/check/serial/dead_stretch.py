@@ -10,7 +10,15 @@ from numpy.typing import NDArray
 from armgap.arm.arm import Arm
 from armgap.arm.corrections import Corrections
 from armgap.check.check import Check
-from armgap.check.dead_stretch import DEAD_SHARE, MISFIT_RATIO, Run, constant_torques, dead_check, merged
+from armgap.check.dead_stretch import (
+    DEAD_SHARE,
+    MISFIT_RATIO,
+    Run,
+    beyond_friction,
+    constant_torques,
+    dead_check,
+    merged,
+)
 from armgap.check.serial.weak_form import MOST_INTERVALS, LogRows, Rows
 from armgap.log.log import Log
 
@@ -60,7 +68,8 @@ def find(logs: Sequence[Log], arm: Arm) -> tuple[Corrections, list[Check]]:
     checks: list[Check] = []
     for log, of_log in zip(logs, runs, strict=True):
         within = {run: LogRows.of(log, arm, run[1], min(run[2], run[1] + most) + 1) for run in of_log}
-        said = [check for run, rows in within.items() if rows and (check := _judged(log, run, rows, theta, outside))]
+        judged = (_judged(log, run, rows, arm, theta, outside) for run, rows in within.items() if rows)
+        said = [check for check in judged if check]
         spans = [check for check in said if _skipped(check)]
         checks += [*merged(spans), *(check for check in said if check not in spans)]
     skip = tuple(span for check in checks for span in _skipped(check))
@@ -115,7 +124,7 @@ def _alive(rows: LogRows, runs: Sequence[Run]) -> NDArray[np.bool_]:
 
 
 def _judged(
-    log: Log, run: Run, rows: LogRows, theta: NDArray[np.float64], outside: NDArray[np.float64]
+    log: Log, run: Run, rows: LogRows, arm: Arm, theta: NDArray[np.float64], outside: NDArray[np.float64]
 ) -> Check | None:
     """Return a check of a run in which the equation of motion lacks much more torque than outside of it; None otherwise."""
     j, first, last = run
@@ -127,11 +136,16 @@ def _judged(
     if inside.sum() < _FEWEST_ROWS:
         return None
     asked = rows.psi[inside, j] * theta
-    within = float(np.mean((rows.y[inside, j] - asked.sum(axis=1)) ** 2))
+    lacking = rows.y[inside, j] - asked.sum(axis=1)
+    if not whole:
+        coulomb = 12 * log.n_joints + j
+        moving = np.abs(rows.psi[inside, j, coulomb]) > _ONE_WAY
+        lacking = beyond_friction(lacking, moving, max(float(theta[coulomb]), float(arm.theta[coulomb])))
+    within = float(np.mean(lacking**2))
     inertial = 10 * rows.y.shape[1]
     largest = max(float(np.mean(asked[:, :inertial].sum(axis=1) ** 2)), float(np.mean(rows.y[:, j] ** 2)))
     if whole:
-        lacks = _beside_friction(rows.psi[inside, j], rows.y[inside, j] - asked.sum(axis=1), j)
+        lacks = _beside_friction(rows.psi[inside, j], lacking, j)
         not_recorded = lacks > _NOT_RECORDED * largest and within > MISFIT_RATIO * outside[j]
         return _not_recorded(log, j, within) if not_recorded else None
     if within > MISFIT_RATIO * outside[j] and within > DEAD_SHARE * largest:
