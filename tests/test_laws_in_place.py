@@ -45,14 +45,12 @@ def impulses(missing: NDArray[np.float64], threshold: float) -> list[dict[str, A
     ]
 
 
-@pytest.mark.parametrize("name", ["torque_threshold", "torque_speed_limit", "torque_asymmetric_limit"])
+@pytest.mark.parametrize("name", ["torque_speed_limit", "torque_asymmetric_limit"])
 def test_a_law_of_the_drive_gives_the_impulses_of_all_pushes(name: str) -> None:
     q = np.sin(2 * np.pi * 0.4 * TIMES) + 0.4 * np.sin(2 * np.pi * 1.1 * TIMES)
     speed = np.gradient(q, TIMES)
     tau = 2.0 * np.cos(2 * np.pi * 0.31 * TIMES + 0.4) + 1.0 * np.cos(2 * np.pi * 0.83 * TIMES)
-    if name == "torque_threshold":
-        missing = np.where(np.abs(tau) < 0.3, -tau, 0.0)
-    elif name == "torque_speed_limit":
+    if name == "torque_speed_limit":
         limit = np.where(tau * speed > 0.0, np.maximum(2.6 - 0.5 * np.abs(speed), 0.0), np.inf)
         missing = np.clip(tau, -limit, limit) - tau
     else:

@@ -1,6 +1,6 @@
 """Laws of a drive that no effect of the library has, each with the torque that it adds to the command (mostly takes from it).
 
-A drive may change its torque at a limited rate, deliver less at speed or nothing below a threshold, or have another limit in either direction.
+A drive may change its torque at a limited rate, deliver less at speed, or have another limit in either direction.
 """
 
 from __future__ import annotations
@@ -22,8 +22,7 @@ Array = NDArray[np.float64]
 _SPEED_S = 0.01
 #: Times that a drive needs for the range of its commands at the rates that are tried [s].
 _SLEW_TIMES = tuple(0.01 * 1.25**k for k in range(31))
-#: Quantiles of the size of the torque at which thresholds are tried, and limits of either direction.
-_THRESHOLDS = (*np.arange(0.005, 0.05, 0.005), *np.arange(0.05, 0.6, 0.02))
+#: Quantiles of the torque at which limits of either direction are tried.
 _LIMITS = (0.5, 0.6, 0.7, 0.8, 0.85, 0.9, 0.95, 0.975, 1.0)
 #: Torques at standstill, and their decrease up to the log's speeds, relative to the largest torque, of limits that fall with the speed.
 _STALL = (*np.arange(0.3, 1.11, 0.05), 1.2, 1.3, 1.5, 1.7, 2.0, 2.5, 3.0, 4.0)
@@ -32,7 +31,6 @@ _FALL = (0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0)
 WORDS = {
     "torque_rate_limit": "a drive whose torque changes by at most {:.3g} {}/s does the same",
     "torque_speed_limit": "a limit of the torque that falls with the speed, as by the supply voltage, does the same",
-    "torque_threshold": "a drive that delivers nothing below {:.3g} {} does the same",
     "torque_asymmetric_limit": "a drive with limits of {:.3g} and -{:.3g} {} does the same",
 }
 
@@ -69,7 +67,6 @@ def frequent_laws(logs: Sequence[Log], j: int) -> Iterator[DriveLaw]:
 def all_laws(logs: Sequence[Log], j: int) -> Iterator[DriveLaw]:
     """Yield all laws of joint `j` (from 0) that are tried."""
     yield from _rates(logs, j)
-    yield from _thresholds(logs, j)
     yield from _falling(logs, j, _STALL, _FALL)
     yield from _two_limits(logs, j)
 
@@ -81,13 +78,6 @@ def _rates(logs: Sequence[Log], j: int) -> Iterator[DriveLaw]:
     behind = [slewed(log.t, x, rates) for log, x in zip(logs, tau, strict=True)]
     for k, rate in enumerate(rates):
         yield DriveLaw("torque_rate_limit", (float(rate),), [x[k] - u for x, u in zip(behind, tau, strict=True)])
-
-
-def _thresholds(logs: Sequence[Log], j: int) -> Iterator[DriveLaw]:
-    """Yield thresholds below which a drive delivers nothing."""
-    tau = [log.tau[:, j] for log in logs]
-    for level in np.unique(np.quantile(np.abs(np.concatenate(tau)), _THRESHOLDS)):
-        yield DriveLaw("torque_threshold", (float(level),), [np.where(np.abs(x) < level, -x, 0.0) for x in tau])
 
 
 def _falling(logs: Sequence[Log], j: int, stall: Sequence[float], fall: Sequence[float]) -> Iterator[DriveLaw]:

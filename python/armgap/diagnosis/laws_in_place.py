@@ -1,7 +1,7 @@
 """Laws that no effect of the library has, in place of the pushes, lags and delays of a diagnosis.
 
-A drive that changes its torque at a limited rate, delivers less at speed or nothing below a threshold, or has another limit in either direction, and
-friction that rises in places, do at certain times what a push does, again and again. Three tests tell them from pushes, with one or two values
+A drive that changes its torque at a limited rate, delivers less at speed, or has another limit in either direction does at certain times what a push
+does, again and again, and so does friction that rises in places. Three tests tell them from pushes, with one or two values
 against three for every push:
 
 * *equation of motion*: behind a law of the drive hardly any torque is left unexplained. It finds laws that act most of the time, of which the pushes

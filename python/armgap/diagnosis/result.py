@@ -175,7 +175,8 @@ class Cause:
 
     An elastic or slack transmission has `sides`: ``encoder`` and ``friction`` at the ``"motor"`` or the ``"link"``, and ``rotor``, which
     ``"rides"`` on the preceding joints or is ``"geared"``. An external push has a `shape` over time: ``"rectangle"``, or ``"bell"``, a raised cosine
-    with the variance of a rectangle of its duration.
+    with the variance of a rectangle of its duration. Load-dependent friction has the shape ``"torque"`` where the load is the actuator's torque,
+    friction that varies with position ``"twice_per_turn"`` where it does so.
 
     A common law on several `joints` is one cause: `joint` is None, `parameters` are empty, and `values` has one entry per joint
     (`by_joint` splits it into causes of single joints). A term that acts on a sum or a difference of two joints' motion has the factors of

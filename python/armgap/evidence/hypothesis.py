@@ -26,6 +26,14 @@ TOLERANCE = 3e-6
 ON_INERTIA = ("rotor_inertia", "rotor_coupling", "payload")
 #: Number of points of the lookup table from measured to true positions of an encoder.
 TABLE = 4001
+#: Number that tells a form of a law, by its name in results: pushes are bells or not, load-dependent friction takes the actuator's torque, and
+#: friction that varies with position does so twice per turn.
+_FORMS = {
+    "rectangle": {"bell": 0.0},
+    "bell": {"bell": 1.0},
+    "torque": {"of_torque": 1.0},
+    "twice_per_turn": {"twice": 1.0},
+}
 
 
 class EffectInstance(NamedTuple):
@@ -49,9 +57,9 @@ def at_motor(sides: dict[str, str] | None) -> dict[str, float]:
     return {**found, "rotor_rides": float(sides["rotor"] == "rides")}
 
 
-def bell(shape: str | None) -> dict[str, float]:
-    """Return the `shape` of an external push as a number, 1 for a bell and 0 for a rectangle; nothing for other causes."""
-    return {} if shape is None else {"bell": float(shape == "bell")}
+def form(shape: str | None) -> dict[str, float]:
+    """Return the `shape` of a cause's law as a number, by the name of its other form; nothing for effects with one form."""
+    return {} if shape is None else _FORMS[shape]
 
 
 @dataclass(frozen=True)
@@ -86,7 +94,7 @@ class Hypothesis:
                 c["joint"],
                 {name: p["value"] for name, p in c["parameters"].items()}
                 | at_motor(c.get("sides"))
-                | bell(c.get("shape")),
+                | form(c.get("shape")),
                 c.get("log"),
             )
             for c in data.get("causes") or []

@@ -11,7 +11,6 @@ __all__ = ["many_pushes", "times_of_pushes"]
 LAWS = {
     "torque_rate_limit": "a limit of the drive",
     "torque_speed_limit": "a limit of the drive",
-    "torque_threshold": "a limit of the drive",
     "torque_asymmetric_limit": "a limit of the drive",
     "uneven_friction": "uneven friction",
 }

@@ -8,7 +8,7 @@
 //! W. J. Cody and W. Waite 1980, *Software manual for the elementary functions*, chapter 8. The coefficients interpolate the series at
 //! Chebyshev's points of `r^2` up to `(pi/2)^2`; the polynomials are off by less than 4e-17, in single precision by 1.1e-10.
 
-use crate::cpu::Cpu;
+use crate::cpu::{Cpu, Kernel, Level};
 use crate::lanes::Lanes;
 use crate::number::Number;
 use crate::real::{Real, lit};
@@ -130,6 +130,37 @@ pub(crate) fn sines_cosines_of_many<C: Cpu, T: Real, const N: usize>(angles: &[T
         }
     }
     found
+}
+
+/// Sines and cosines of `count` angles, rad, `angle(i)` each, eight at a time side by side with the widest instructions of the processor; `then(i, sine,
+/// cosine)` takes them in order.
+#[inline]
+pub(crate) fn for_sines_cosines<T: Real>(
+    count: usize,
+    angle: impl Fn(usize) -> T,
+    then: impl FnMut(usize, T, T),
+) {
+    struct Waves<A, F>(usize, A, F);
+
+    impl<T: Real, A: Fn(usize) -> T, F: FnMut(usize, T, T)> Kernel
+        for (Waves<A, F>, core::marker::PhantomData<T>)
+    {
+        type Output = ();
+
+        #[inline(always)]
+        fn run<C: Cpu>(self) {
+            let Waves(count, angle, mut then) = self.0;
+            for first in (0..count).step_by(8) {
+                let last = count - 1;
+                let found = sines_cosines::<C, T, 8>(core::array::from_fn(|l| angle((first + l).min(last))));
+                for (i, both) in (first..count).zip(found) {
+                    then(i, both.sine, both.cosine);
+                }
+            }
+        }
+    }
+
+    Level::widest().run_wide((Waves(count, angle, then), core::marker::PhantomData));
 }
 
 /// Sine and cosine of the angle `x`, rad, by the series alone; valid up to [`largest`].

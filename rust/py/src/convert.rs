@@ -2,7 +2,7 @@
 
 use armgap_core::arm::{ArmKind, LinkParameters, TwoLink};
 use armgap_core::chain::{ChainJoint, JointKind};
-use armgap_core::effect::{PulseShape, Scope, catalogue, find};
+use armgap_core::effect::{PulseShape, Scope, catalogue, dead_zone_with_jump, find, find_form};
 use armgap_core::transmission::Sides;
 use armgap_fit::model::arm::ArmDescription;
 use armgap_fit::model::chain::ChainDescription;
@@ -17,6 +17,10 @@ use std::collections::BTreeMap;
 
 /// Key in the values of an external push: 1 where its torque is bell-shaped, 0 where it is constant.
 const BELL: &str = "bell";
+
+/// Keys in the values of effects that are 1 where the law has this further form: load-dependent friction of the actuator's torque, and friction that
+/// varies twice per turn.
+const FORMS: [(&str, &str); 2] = [("of_torque", "torque"), ("twice", "twice_per_turn")];
 
 /// Key in the values of an effect with a transmission: 1 where the encoder is at the motor, 0 where it is at the link.
 const ENCODER_SIDE: &str = "encoder_at_motor";
@@ -134,8 +138,7 @@ pub fn effect_instances(
                 let known: Vec<&str> = catalogue::<f64>().iter().map(|l| l.spec().name).collect();
                 PyValueError::new_err(format!("unknown effect `{name}`; known: {}", known.join(", ")))
             })?;
-            let spec = law.spec();
-            let joint = match (spec.scope, joint) {
+            let joint = match (law.spec().scope, joint) {
                 (Scope::Arm, None) => 0,
                 (Scope::Joint, Some(j)) if (1..=joints).contains(&j) => j - 1,
                 (Scope::Arm, Some(_)) => {
@@ -150,11 +153,20 @@ pub fn effect_instances(
             let mut values = values;
             let is_bell = law.pulse_shape().is_some() && values.remove(BELL).is_some_and(|x| x != 0.0);
             let law = if is_bell { PulseShape::Bell.law() } else { law };
+            let jumps = dead_zone_with_jump::<f64>().spec();
+            let law = if name == jumps.name && values.contains_key(jumps.parameters[1].name) {
+                dead_zone_with_jump()
+            } else {
+                law
+            };
+            let form = FORMS.into_iter().find(|(key, _)| values.remove(*key).is_some_and(|x| x != 0.0));
+            let law = form.and_then(|(_, form)| find_form::<f64>(&name, form)).unwrap_or(law);
             let mut at_motor =
                 |name: &str| law.has_transmission() && values.remove(name).is_some_and(|x| x != 0.0);
             let (encoder_at_motor, friction_at_motor, rotor_rides) =
                 (at_motor(ENCODER_SIDE), at_motor(FRICTION_SIDE), at_motor(ROTOR));
             let sides = Sides { encoder_at_motor, friction_at_motor, rotor_rides };
+            let spec = law.spec();
             let mut p = [0.0; 3];
             for (slot, parameter) in p.iter_mut().zip(spec.parameters) {
                 let value = *values.get(parameter.name).ok_or_else(|| {

@@ -136,16 +136,16 @@ def _judged(
     if inside.sum() < _FEWEST_ROWS:
         return None
     asked = rows.psi[inside, j] * theta
-    lacking = rows.y[inside, j] - asked.sum(axis=1)
+    residual = rows.y[inside, j] - asked.sum(axis=1)
     if not whole:
         coulomb = 12 * log.n_joints + j
         moving = np.abs(rows.psi[inside, j, coulomb]) > _ONE_WAY
-        lacking = beyond_friction(lacking, moving, max(float(theta[coulomb]), float(arm.theta[coulomb])))
-    within = float(np.mean(lacking**2))
+        residual = beyond_friction(residual, moving, max(float(theta[coulomb]), float(arm.theta[coulomb])))
+    within = float(np.mean(residual**2))
     inertial = 10 * rows.y.shape[1]
     largest = max(float(np.mean(asked[:, :inertial].sum(axis=1) ** 2)), float(np.mean(rows.y[:, j] ** 2)))
     if whole:
-        lacks = _beside_friction(rows.psi[inside, j], lacking, j)
+        lacks = _beside_friction(rows.psi[inside, j], residual, j)
         not_recorded = lacks > _NOT_RECORDED * largest and within > MISFIT_RATIO * outside[j]
         return _not_recorded(log, j, within) if not_recorded else None
     if within > MISFIT_RATIO * outside[j] and within > DEAD_SHARE * largest:

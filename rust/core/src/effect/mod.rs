@@ -42,6 +42,7 @@ mod parameter;
 pub use external_pulse::PulseShape;
 pub use input_segment::{InputSegment, interval};
 pub use parameter::{EffectParameter, NEVER, Quantity};
+pub use torque_dead_zone::with_jump as dead_zone_with_jump;
 
 use crate::real::Real;
 use crate::transmission::Transmission;
@@ -57,8 +58,8 @@ pub fn catalogue<T: Real>() -> &'static [&'static dyn Effect<T>] {
         &stribeck::Stribeck,
         &quadratic_drag::QuadraticDrag,
         &cubic_drag::CubicDrag,
-        &load_dependent_friction::LoadDependentFriction,
-        &position_dependent_friction::PositionDependentFriction,
+        &load_dependent_friction::LoadDependentFriction { of_torque: false },
+        &position_dependent_friction::PositionDependentFriction { twice: false },
         &friction_warmup::FrictionWarmup,
         &presliding::Presliding,
         &viscous_asymmetry::ViscousAsymmetry,
@@ -71,7 +72,7 @@ pub fn catalogue<T: Real>() -> &'static [&'static dyn Effect<T>] {
         &actuator_delay::ActuatorDelay,
         &torque_saturation::TorqueSaturation,
         &torque_ripple::TorqueRipple,
-        &torque_dead_zone::TorqueDeadZone,
+        &torque_dead_zone::TorqueDeadZone { jumps: false },
         &payload::Payload,
         &base_tilt::BaseTilt,
         &joint_spring::JointSpring,
@@ -83,6 +84,19 @@ pub fn catalogue<T: Real>() -> &'static [&'static dyn Effect<T>] {
         &contact::Contact,
         &external_pulse::ExternalPulse { shape: PulseShape::Rectangle },
     ]
+}
+
+/// Further forms of effects of the library: the same effects, by name, with another law.
+pub fn further_forms<T: Real>() -> &'static [&'static dyn Effect<T>] {
+    &[
+        &load_dependent_friction::LoadDependentFriction { of_torque: true },
+        &position_dependent_friction::PositionDependentFriction { twice: true },
+    ]
+}
+
+/// The form of the effect called `name` whose [`Effect::form`] is `form`; `None` if there is none.
+pub fn find_form<T: Real>(name: &str, form: &str) -> Option<&'static dyn Effect<T>> {
+    further_forms::<T>().iter().copied().find(|e| e.spec().name == name && e.form() == Some(form))
 }
 
 /// The effect called `name`, `None` if there is none.
@@ -212,6 +226,44 @@ pub struct JointPoint<T> {
     pub memory: T,
 }
 
+/// States, torques and loads of a joint at several instants, quantity by quantity: of each [`JointPoint`] the laws of effects read few fields.
+#[derive(Debug, Clone, Copy)]
+pub struct JointPoints<'a, T> {
+    /// [`JointPoint::t`] at each instant, s.
+    pub t: &'a [T],
+    /// [`JointPoint::q`] at each instant, rad or m.
+    pub q: &'a [T],
+    /// [`JointPoint::dq`] at each instant, rad/s or m/s.
+    pub dq: &'a [T],
+    /// [`JointPoint::tau`] at each instant, N m (N).
+    pub tau: &'a [T],
+    /// [`JointPoint::load`] at each instant, N m (N).
+    pub load: &'a [T],
+    /// [`JointPoint::friction`] at each instant, N m (N).
+    pub friction: &'a [T],
+    /// [`JointPoint::other`] at each instant.
+    pub other: &'a [T],
+    /// [`JointPoint::memory`] at each instant, N m (N).
+    pub memory: &'a [T],
+}
+
+impl<T: Real> JointPoints<'_, T> {
+    /// State, torque and load at instant `i`.
+    #[inline(always)]
+    pub fn at(&self, i: usize) -> JointPoint<T> {
+        JointPoint {
+            t: self.t[i],
+            q: self.q[i],
+            dq: self.dq[i],
+            tau: self.tau[i],
+            load: self.load[i],
+            friction: self.friction[i],
+            other: self.other[i],
+            memory: self.memory[i],
+        }
+    }
+}
+
 /// Joint limit: position at which a joint's torque jumps, and the side beyond it, and stiffness and damping of the contact there.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Edge<T> {
@@ -264,9 +316,9 @@ pub trait Effect<T: Real>: Sync {
     }
 
     /// Adds [`Effect::force`] at each of `points` to `sums`.
-    fn add_forces(&self, p: &[T; MAX_PARAMETERS], points: &[JointPoint<T>], sums: &mut [T]) {
-        for (sum, x) in sums.iter_mut().zip(points) {
-            *sum += self.force(p, x);
+    fn add_forces(&self, p: &[T; MAX_PARAMETERS], points: &JointPoints<'_, T>, sums: &mut [T]) {
+        for (i, sum) in sums.iter_mut().enumerate() {
+            *sum += self.force(p, &points.at(i));
         }
     }
 
@@ -274,12 +326,12 @@ pub trait Effect<T: Real>: Sync {
     fn add_coulombs(
         &self,
         p: &[T; MAX_PARAMETERS],
-        points: &[JointPoint<T>],
+        points: &JointPoints<'_, T>,
         directions: &[T],
         levels: &mut [T],
     ) {
-        for ((level, x), direction) in levels.iter_mut().zip(points).zip(directions) {
-            *level += self.coulomb(p, x, *direction);
+        for (i, (level, direction)) in levels.iter_mut().zip(directions).enumerate() {
+            *level += self.coulomb(p, &points.at(i), *direction);
         }
     }
 
@@ -320,6 +372,11 @@ pub trait Effect<T: Real>: Sync {
 
     /// Rewrites the command of one joint over a whole log, with sample times `t`, s, into the torque that reaches the joint, N m (N).
     fn command(&self, _p: &[T; MAX_PARAMETERS], _t: &[T], _torque: &mut [InputSegment<T>]) {}
+
+    /// Name in results of the form of the effect's law; none for effects with one form, and for the first form of others.
+    fn form(&self) -> Option<&'static str> {
+        self.pulse_shape().map(PulseShape::name)
+    }
 
     /// Course of the torque over time, for an external disturbance.
     fn pulse_shape(&self) -> Option<PulseShape> {

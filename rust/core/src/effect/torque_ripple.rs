@@ -1,8 +1,8 @@
 //! Torque ripple (cogging): `amplitude sin(n q + phase)`, a fixed number of cycles per turn.
 
-use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Spec};
+use super::{Effect, EffectParameter, Hooks, JointPoint, JointPoints, MAX_PARAMETERS, Quantity, Spec};
 use crate::real::Real;
-use crate::trig::sin_cos;
+use crate::trig::{for_sines_cosines, sin_cos};
 
 /// Torque ripple (cogging): torque that repeats with the position of the joint, `amplitude sin(n q + phase)`.
 #[derive(Debug)]
@@ -45,5 +45,10 @@ impl<T: Real> Effect<T> for TorqueRipple {
 
     fn force(&self, p: &[T; MAX_PARAMETERS], x: &JointPoint<T>) -> T {
         p[0] * sin_cos(p[1] * x.q + p[2]).0
+    }
+
+    fn add_forces(&self, p: &[T; MAX_PARAMETERS], points: &JointPoints<'_, T>, sums: &mut [T]) {
+        let wave = |i: usize, sine: T, _: T| sums[i] += p[0] * sine;
+        for_sines_cosines(points.q.len(), |i| p[1] * points.q[i] + p[2], wave);
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::arm::Arm;
 use crate::cpu::Cpu;
-use crate::effect::{Hooks, JointPoint};
+use crate::effect::{Hooks, JointPoints};
 use crate::fixed_mode::{Dynamics, Instant, Modes};
 use crate::kinematics::{AngleRange, JointState, KinematicState, RigidArm};
 use crate::lanes::Lanes;
@@ -105,62 +105,55 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, const
         memory: Option<&Lanes<T, C, W>>,
         j: usize,
     ) -> [Lanes<T, C, W>; 2] {
-        let mut x = [self.point(at, j, 0); W];
-        for l in 1..W {
-            x[l] = self.point(at, j, l);
-        }
+        let friction = self.rigid.viscous[j] * at.dq.size() + self.rigid.coulomb[j];
+        let none = [T::zero(); W];
+        let points = JointPoints {
+            t: &at.t.0,
+            q: &at.q.0,
+            dq: &at.dq.0,
+            tau: &at.tau.0,
+            load: &at.bias.0,
+            friction: &friction.0,
+            other: &other.0,
+            memory: memory.map_or(&none, |memory| &memory.0),
+        };
         let (mut level, mut force) = (self.rigid.coulomb[j], Lanes::of(T::zero()));
         if self.hooks[j].coulomb {
-            level = self.levels(&x, direction, j);
+            level = self.levels(&points, direction, j);
         }
         if self.hooks[j].force {
-            for l in 0..W {
-                x[l].other = other.0[l];
-                x[l].memory = memory.map_or(T::zero(), |memory| memory.0[l]);
-            }
-            force = self.forces(&x, j);
+            force = self.forces(&points, j);
         }
         [level, force]
     }
 
-    #[inline]
-    fn point(&self, at: &JointInstant<Lanes<T, C, W>>, j: usize, l: usize) -> JointPoint<T> {
-        self.plants[l].point(j, at.t.0[l], at.q.0[l], at.dq.0[l], at.tau.0[l], at.bias.0[l])
-    }
-
     /// Coulomb levels of joint `j` in the lanes where it slides in `direction`, at the states `x` of the lanes, N m (N).
     #[inline]
-    fn levels(&self, x: &[JointPoint<T>; W], direction: Lanes<T, C, W>, j: usize) -> Lanes<T, C, W> {
+    fn levels(&self, x: &JointPoints<'_, T>, direction: Lanes<T, C, W>, j: usize) -> Lanes<T, C, W> {
         let mut levels = self.rigid.coulomb[j];
         if !self.same_plant {
             for l in 0..W {
-                levels.0[l] = self.plants[l].level(j, &x[l], direction.0[l]);
+                levels.0[l] = self.plants[l].level(j, &x.at(l), direction.0[l]);
             }
             return levels;
         }
-        let (mut sliding, mut count) = ([0; W], 0);
-        let (mut points, mut along, mut sums) = (*x, direction.0, [T::zero(); W]);
-        for l in 0..W {
-            if direction.0[l] != T::zero() {
-                (sliding[count], points[count], along[count]) = (l, x[l], direction.0[l]);
-                sums[count] = self.plants[0].rigid().coulomb[j];
-                count += 1;
-            }
-        }
+        let mut sums = [self.plants[0].rigid().coulomb[j]; W];
         for effect in self.plants[0].effects() {
             if effect.joint == j && effect.law.spec().hooks.coulomb {
-                effect.law.add_coulombs(&effect.p, &points[..count], &along[..count], &mut sums[..count]);
+                effect.law.add_coulombs(&effect.p, x, &direction.0, &mut sums);
             }
         }
-        for i in 0..count {
-            levels.0[sliding[i]] = sums[i].max(T::zero());
+        for l in 0..W {
+            if direction.0[l] != T::zero() {
+                levels.0[l] = sums[l].max(T::zero());
+            }
         }
         levels
     }
 
     /// Torques of the effects on joint `j` at the states `x` of the lanes, N m (N).
     #[inline]
-    fn forces(&self, x: &[JointPoint<T>; W], j: usize) -> Lanes<T, C, W> {
+    fn forces(&self, x: &JointPoints<'_, T>, j: usize) -> Lanes<T, C, W> {
         let mut sums = [T::zero(); W];
         if self.same_plant {
             for effect in self.plants[0].effects() {
@@ -170,7 +163,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, const
             }
         } else {
             for l in 0..W {
-                sums[l] = self.plants[l].force(j, &x[l]);
+                sums[l] = self.plants[l].force(j, &x.at(l));
             }
         }
         Lanes::new(sums)

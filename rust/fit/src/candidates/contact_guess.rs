@@ -40,22 +40,26 @@ struct ContactSample {
 /// Factor from the fitted stiffness of a contact to a second, stiffer guess: an impact shorter than the local cubic appears softer than it is.
 const HARDER: f64 = 8.0;
 
-/// Guesses of contacts from the residual torque of logs under a model, per joint: at most one contact at either end of the travel, each with its
-/// fitted stiffness and a stiffer one; `speed` is the RMS speed per joint, rad/s or m/s.
-pub fn contact_guesses<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+/// Residual torques of logs under a model, from which guesses are made; `speed` is the RMS speed per joint, rad/s or m/s.
+pub fn residual_torques<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     tracks: &[Track<N>],
     arm: &A,
     model: &Hypothesis<P>,
     speed: &[f64; N],
-) -> [Vec<ContactGuess>; N] {
+) -> Vec<InverseDynamicsResidual<N>> {
     let slow = REGULARISATION_SPEED * speed.iter().copied().fold(f64::INFINITY, f64::min);
-    let rows: Vec<InverseDynamicsResidual<N>> = tracks
+    tracks
         .iter()
         .filter_map(|track| {
             inverse_dynamics_residuals(arm, track, model, &track.pushes, ACCELERATION_HALF_WIDTH, slow)
         })
         .flatten()
-        .collect();
+        .collect()
+}
+
+/// Guesses of contacts from the residual torques of logs (`residual_torques`), per joint: at most one contact at either end of the travel, each with its
+/// fitted stiffness and a stiffer one.
+pub fn contact_guesses<const N: usize>(rows: &[InverseDynamicsResidual<N>]) -> [Vec<ContactGuess>; N] {
     let of = |j: usize| {
         rows.iter().map(move |r| ContactSample {
             q: r.motion[0][j],

@@ -1,6 +1,7 @@
 //! Selection of the candidates that are worth a full fit, and their initial guesses.
 
-use crate::candidates::contact_guess::contact_guesses;
+use crate::candidates::contact_guess::{contact_guesses, residual_torques};
+use crate::candidates::dead_zone_guess::dead_zone_guess;
 use crate::candidates::periodogram::periodogram_peaks;
 use crate::candidates::screen::{ScoreTest, TestPoint, effect_instances};
 use crate::candidates::traces::Traces;
@@ -10,9 +11,10 @@ use crate::likelihood::holdout::is_plausible;
 use crate::likelihood::jacobian::Sensitivities;
 use crate::likelihood::solve::Fit;
 use crate::model::hypothesis::{EffectInstance, Hypothesis};
+use crate::predict::residual_torque::InverseDynamicsResidual;
 use crate::progress::Phase;
 use armgap_core::arm::Arm;
-use armgap_core::effect::Trial;
+use armgap_core::effect::{Trial, dead_zone_with_jump};
 use std::sync::Arc;
 
 /// Largest number of candidates that get a full fit at each node of the model search.
@@ -84,7 +86,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             // A contact that carries a part of the load all the time has biased the parameters that were fitted without it.
             let trusted = Hypothesis { theta: self.prior.theta, ..fit.hypothesis.clone() };
             initial_guesses.extend(
-                self.contact_guesses(&screening.candidates, &trusted)
+                contacts(&screening.candidates, &self.residual_torques(&trusted))
                     .into_iter()
                     .map(|stop| trusted.with(stop)),
             );
@@ -138,8 +140,15 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     fn candidates_around(&self, fit: &Fit<P>, weights: &SplitWeighting<N>) -> Vec<EffectInstance> {
         let mut all = self.open_candidates(&fit.hypothesis);
         all.extend(self.ripple_guesses(&all, weights, fit));
-        all.extend(self.contact_guesses(&all, &fit.hypothesis));
+        let rows = self.residual_torques(&fit.hypothesis);
+        all.extend(contacts(&all, &rows));
+        all.extend(dead_zone_guesses(&all, &rows));
         all
+    }
+
+    /// Residual torques of the training logs under `model`.
+    fn residual_torques(&self, model: &Hypothesis<P>) -> Vec<InverseDynamicsResidual<N>> {
+        residual_torques(&self.training.data.tracks, &self.arm, model, &self.scales.speed)
     }
 
     /// Candidate effects that are not yet in `model`, at their initial guesses.
@@ -164,25 +173,6 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             found
                 .into_iter()
                 .map(|r| EffectInstance { p: [r.amplitude, r.cycles, r.phase], ..*effect })
-                .collect::<Vec<_>>()
-        };
-        open.iter().flat_map(initial_guesses).collect()
-    }
-
-    /// Initial guesses of contacts, which act beyond a position, from the residual torque under `model`.
-    fn contact_guesses(&self, all: &[EffectInstance], model: &Hypothesis<P>) -> Vec<EffectInstance> {
-        let mut open: Vec<EffectInstance> = all.iter().filter(|c| c.is_contact()).copied().collect();
-        open.sort_by_key(|c| c.joint);
-        open.dedup_by(|a, b| a.same_place(b));
-        if open.is_empty() {
-            return Vec::new();
-        }
-        let found = contact_guesses(&self.training.data.tracks, &self.arm, model, &self.scales.speed);
-        let initial_guesses = |effect: &EffectInstance| {
-            let effect = *effect;
-            found[effect.joint]
-                .iter()
-                .map(move |stop| EffectInstance { p: *stop, ..effect })
                 .collect::<Vec<_>>()
         };
         open.iter().flat_map(initial_guesses).collect()
@@ -243,6 +233,36 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         effect.p[found.tested] = (parameter.neutral + size).clamp(parameter.lower, parameter.upper);
         (effect, effect.p[found.tested] - parameter.neutral)
     }
+}
+
+/// Initial guesses of contacts, which act beyond a position, from residual torques.
+fn contacts<const N: usize>(
+    all: &[EffectInstance],
+    rows: &[InverseDynamicsResidual<N>],
+) -> Vec<EffectInstance> {
+    let mut open: Vec<EffectInstance> = all.iter().filter(|c| c.is_contact()).copied().collect();
+    open.sort_by_key(|c| c.joint);
+    open.dedup_by(|a, b| a.same_place(b));
+    if open.is_empty() {
+        return Vec::new();
+    }
+    let found = contact_guesses(rows);
+    let initial_guesses = |effect: &EffectInstance| {
+        let effect = *effect;
+        found[effect.joint].iter().map(move |stop| EffectInstance { p: *stop, ..effect }).collect::<Vec<_>>()
+    };
+    open.iter().flat_map(initial_guesses).collect()
+}
+
+/// Initial guesses of dead zones whose torque jumps at the level, from residual torques, on the joints that have a dead zone among the candidates `all`.
+fn dead_zone_guesses<const N: usize>(
+    all: &[EffectInstance],
+    rows: &[InverseDynamicsResidual<N>],
+) -> Vec<EffectInstance> {
+    let law = dead_zone_with_jump();
+    let open = |j: &usize| all.iter().any(|c| c.same_place(&EffectInstance::new(law, *j, [0.0; 3])));
+    let guess = |j: usize| Some(EffectInstance::new(law, j, [dead_zone_guess(rows, j)?, 1.0, 0.0]));
+    (0..N).filter(open).filter_map(guess).collect()
 }
 
 /// Indices of the best `SIMULATED_AGAIN` tests of every effect and joint, of those with `of`.

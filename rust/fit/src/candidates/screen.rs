@@ -9,7 +9,7 @@ use crate::likelihood::scale::Scales;
 use crate::likelihood::solve::{FitProblem, inverse_of_seen, neutral};
 use crate::model::hypothesis::{EffectInstance, Hypothesis};
 use armgap_core::arm::Arm;
-use armgap_core::effect::{Scope, Trial, catalogue};
+use armgap_core::effect::{Scope, Trial, catalogue, further_forms};
 use armgap_core::transmission::Sides;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -67,7 +67,8 @@ pub fn effect_instances<const N: usize>(
     all_guesses: bool,
 ) -> Vec<EffectInstance> {
     let mut all = Vec::new();
-    for law in catalogue::<f64>().iter().filter(|law| law.spec().least_joints <= N) {
+    let laws = catalogue::<f64>().iter().chain(further_forms::<f64>());
+    for law in laws.filter(|law| law.spec().least_joints <= N) {
         let spec = law.spec();
         let joints = if spec.scope == Scope::Joint { N } else { 1 };
         for joint in 0..joints {

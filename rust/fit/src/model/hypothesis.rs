@@ -58,10 +58,10 @@ impl EffectInstance {
         }
     }
 
-    /// Name of the effect, joint, and sides of encoder and friction and whether the rotor rides: equal for effects that differ in values alone.
+    /// Title of the effect, joint, and sides of encoder and friction and whether the rotor rides: equal for effects that differ in values alone.
     pub fn place(&self) -> (&'static str, usize, [bool; 3]) {
         let Sides { encoder_at_motor, friction_at_motor, rotor_rides } = self.sides;
-        (self.law.spec().name, self.joint, [encoder_at_motor, friction_at_motor, rotor_rides])
+        (self.law.spec().title, self.joint, [encoder_at_motor, friction_at_motor, rotor_rides])
     }
 
     /// Whether `other` is the same effect on the same joint, at any parameter values.

@@ -29,7 +29,6 @@ use crate::search::attribute::Candidate;
 use crate::search::belief::left_over;
 use crate::search::model_search::Attribution;
 use armgap_core::arm::Arm;
-use armgap_core::effect::PulseShape;
 use rayon::prelude::*;
 
 /// Share of the gap below which its distribution over the joints is not computed.
@@ -245,7 +244,7 @@ fn cause<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         evidence: Some(cause.evidence),
         sides: cause.effect.law.has_transmission().then(|| SidesSummary::of(cause.effect.sides)),
         log: None,
-        shape: None,
+        shape: cause.effect.law.form(),
     }
 }
 
@@ -269,7 +268,7 @@ fn push<A, const N: usize, const P: usize>(
         evidence: None,
         sides: None,
         log: Some(sample.data.tracks[disturbance.track].name.clone()),
-        shape: disturbance.push.law.pulse_shape().map(PulseShape::name),
+        shape: disturbance.push.law.form(),
     }
 }
 

@@ -254,7 +254,7 @@ pub struct Cause {
     /// Name of the log in which an external disturbance happened.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub log: Option<String>,
-    /// Course of an external disturbance over time: `rectangle`, or `bell`, a raised cosine with the variance over time of a rectangle of its duration.
+    /// Form of the law: a disturbance's `rectangle` or `bell` (a raised cosine of equal variance over time), load friction's `torque`, `twice_per_turn`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shape: Option<&'static str>,
 }

@@ -16,7 +16,7 @@ use crate::search::belief::{Cause, belief_beside, left_over};
 use crate::search::model_search::Attribution;
 use crate::search::rivals::rival_law::LawBeside;
 use armgap_core::arm::Arm;
-use armgap_core::effect::{Scope, Trial};
+use armgap_core::effect::{Scope, Trial, catalogue};
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -69,6 +69,9 @@ pub struct Evidence {
     /// Standard deviation of the size ratio.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_ratio_sigma: Option<f64>,
+    /// Squared distance of the arm's parameters from the arm file's values, in standard deviations, without the cause and with it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub prior_costs: Option<[f64; 2]>,
     /// Odds that the encoder zeros of the recordings have a common mean that is not zero, against a scatter around zero; only for an offset of the
     /// encoder's zero and effects that are equivalent to it, and `None` where all recordings have the same zero.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -135,10 +138,14 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let Attribution { model, on_holdout, without, causes, nodes, .. } = attribution;
         let Some(last) = nodes.last() else { return };
         self.weigh_in(&Weighed { last, model, on_holdout, without }, causes);
-        // What is left unexplained moves the parameters too, whose return to their prior values is all that speaks for these.
+        // What is left unexplained moves the parameters too, whose return to their prior values is all that speaks for these; but hardly in the direction of
+        // an effect with few values.
         let belief = belief_beside(left_over(nodes), 0.0);
         for cause in causes.iter_mut().filter(|cause| cause.ground == Ground::Trust) {
-            cause.probability = belief * cause.evidence.selected;
+            let chance = cause.evidence.prior_costs.map_or(1.0, |costs| {
+                restored_by_chance(costs, self.prior.inertial, cause.effect.len(), catalogue::<f64>().len())
+            });
+            cause.probability = belief.max(1.0 - chance) * cause.evidence.selected;
         }
     }
 
@@ -179,6 +186,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
                 let bare = full + rises.iter().sum::<f64>();
                 cause.evidence.gain = Some((bare - full) / rest);
                 cause.evidence.gain_sigma = Some(standard_error_of_sum(&rises) / rest);
+                cause.evidence.prior_costs = Some([without.prior_cost, model.prior_cost]);
                 if is_plausible::<P>(without.prior_cost) {
                     // The other effects in the model keep the parameters plausible without this cause: only predicted motion can be evidence for it.
                     cause.ground = Ground::Motion;
@@ -215,6 +223,16 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             cause.probability = cause.evidence.probability();
         }
     }
+}
+
+/// Chance, 0 to 1, that one of `tried` effects with `values` free values each takes so much of the squared distance of the parameters from their prior values
+/// (costs without and with it) if they were moved in any direction: the share of the squared length of a random direction in `parameters` dimensions that
+/// is outside of a subspace of `values` dimensions has a beta distribution, and is below `s` with the probability `s^((parameters - values) / 2)`, for two
+/// values exactly.
+fn restored_by_chance([without, with]: [f64; 2], parameters: usize, values: usize, tried: usize) -> f64 {
+    let outside = (with / without).clamp(0.0, 1.0);
+    let one = outside.powf(0.5 * parameters.saturating_sub(values) as f64);
+    (tried as f64 * one).min(1.0)
 }
 
 /// Sets of two and more causes on one joint (by index) in whose place one table may stand: all on the joint, and all but the one with the largest gain.
@@ -304,6 +322,7 @@ mod tests {
             rival_gain: None,
             size_ratio: ratio,
             size_ratio_sigma: ratio.map(|_| 0.05),
+            prior_costs: None,
             beyond_scatter: None,
         }
     }
@@ -312,6 +331,20 @@ mod tests {
     fn a_cause_without_a_rest_beside_it_is_as_sure_as_its_choice() {
         let choice = Evidence { selected: 0.97, gain: None, ..evidence(0.0, Some(-3.0)) };
         assert_eq!(choice.probability(), 0.97);
+    }
+
+    #[test]
+    fn parameters_seldom_return_by_chance() {
+        let chance = |with: f64, values: usize| restored_by_chance([300.0, with], 5, values, 30);
+        // A 3-dimensional normal vector beside 2 dimensions: 0.01^1.5 for one effect.
+        assert!((chance(3.0, 2) - 0.03).abs() < 1e-12);
+        assert!(chance(3.0, 1) < chance(3.0, 2));
+        assert_eq!(chance(100.0, 2), 1.0, "a third of the distance that is left says nothing");
+        assert_eq!(
+            restored_by_chance([300.0, 3.0], 2, 2, 30),
+            1.0,
+            "two values restore two parameters always"
+        );
     }
 
     #[test]

@@ -26,7 +26,7 @@ use crate::predict::window::Dataset;
 use crate::progress::{Observer, ProgressReporter, guarded};
 use crate::result::report::Diagnosis;
 use armgap_core::chain::{Chain, ChainJoint, JointKind, PARAMETERS_PER_JOINT};
-use armgap_core::effect::{Quantity, Scope, Trial};
+use armgap_core::effect::{Quantity, Scope, Trial, dead_zone_with_jump};
 use controller::{PositionController, commanded};
 use pushes::Event;
 use search::{Found, Motion, Search};
@@ -342,6 +342,21 @@ fn controller_settings(controller: &PositionController, inertia: &[f64], period:
 /// Largest number of half cycles over the travel of a joint among the initial guesses of a torque ripple.
 const HALF_CYCLES: usize = 80;
 
+/// Quantiles of the size of a joint's command that are tried as levels at which the torque of a dead zone jumps.
+const LEVELS: usize = 20;
+
+/// Levels, N m or N, that are tried for a dead zone of a joint whose torque jumps there: quantiles of the size of the command.
+fn command_levels<const N: usize>(tracks: &[Track<N>], joint: usize) -> Vec<f64> {
+    let mut sizes: Vec<f64> =
+        tracks.iter().flat_map(|track| &track.held).map(|h| h[joint].mean().abs()).collect();
+    sizes.sort_by(f64::total_cmp);
+    sizes.retain(|size| *size > 0.0);
+    let place = |i: usize| (i as f64 / LEVELS as f64 * sizes.len() as f64) as usize;
+    let mut levels: Vec<f64> = (1..LEVELS).filter_map(|i| sizes.get(place(i))).copied().collect();
+    levels.dedup();
+    levels
+}
+
 /// Every candidate term besides settings of controllers, at each of its initial guesses, grouped by effect and joint. Left out are effects of the
 /// library that simulate a motor as a body separate from its link (the weak form has terms of its own for transmissions), external disturbances, and
 /// effects on the whole arm, which are stated for arms in a plane.
@@ -357,7 +372,12 @@ fn candidates<const N: usize, const P: usize>(
     let mut groups: Vec<Vec<Term>> = Vec::new();
     for effect in effect_instances(&scales, &sides, true) {
         let spec = effect.law.spec();
-        if spec.scope == Scope::Arm || spec.trial == Trial::Disturbance || effect.law.has_transmission() {
+        // Arms in space tell rotors from links: the load is the torque that the transmission passes on.
+        if effect.law.form() == Some("torque")
+            || spec.scope == Scope::Arm
+            || spec.trial == Trial::Disturbance
+            || effect.law.has_transmission()
+        {
             continue;
         }
         // Sine and cosine of a ripple are tested together, for as many cycles over the travel as the test functions let through.
@@ -374,10 +394,17 @@ fn candidates<const N: usize, const P: usize>(
         if !known_units && term.is_gain() {
             continue;
         }
+        let jumps = EffectInstance::new(dead_zone_with_jump(), effect.joint, effect.p);
         match groups.iter_mut().find(|group| group[0].same_place(&term)) {
             // A law that is linear in all of its parameters is tested at all of their values.
-            Some(_) if term.amplitudes() == term.p.len() => {}
+            Some(group)
+                if term.amplitudes() == term.p.len() && group.iter().any(|t| t.title() == term.title()) => {}
             Some(group) => group.push(term),
+            None if effect.same_place(&jumps) => {
+                let levels = command_levels(tracks, effect.joint);
+                let guess = |level: f64| Term::of_law(EffectInstance { p: [level, 1.0, 0.0], ..jumps });
+                groups.push(std::iter::once(term).chain(levels.into_iter().map(guess)).collect());
+            }
             None => groups.push(vec![term]),
         }
     }

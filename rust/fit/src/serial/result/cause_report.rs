@@ -13,7 +13,7 @@ use crate::serial::result::controller_report::behind_controller;
 use crate::serial::search::{Found, Tested};
 use crate::serial::term::transmission::TransmissionLaw;
 use crate::serial::term::{Term, TermKind, TermParameter};
-use armgap_core::effect::{Effect, EffectParameter, PulseShape, Scope, Trial, catalogue};
+use armgap_core::effect::{Effect, EffectParameter, Scope, Trial, catalogue};
 
 /// One-sided 95 % quantile of the standard normal distribution, for upper confidence limits of the sizes of effects.
 const NORMAL_95_ONE_SIDED: f64 = 1.645;
@@ -121,7 +121,10 @@ pub(in crate::serial) fn cause(
             _ => None,
         },
         log: None,
-        shape: None,
+        shape: match &term.kind {
+            TermKind::Law(effect) => effect.law.form(),
+            _ => None,
+        },
     };
     let behind = controller.map(|controller| behind_controller(&cause, controller));
     cause.equivalents.extend(behind.into_iter().flatten());
@@ -148,7 +151,7 @@ pub(in crate::serial) fn pushes_of(event: &Event, log: &str, rotary: &[bool]) ->
             evidence: None,
             sides: None,
             log: Some(log.to_owned()),
-            shape: push.law.pulse_shape().map(PulseShape::name),
+            shape: push.law.form(),
         }
     };
     event.pushes().into_iter().map(of_joint).collect()
