@@ -294,7 +294,7 @@ fn promising(screened: &[ScoreTest], [least, least_with_threshold]: [f64; 2]) ->
         // periodogram.
         let several = has_threshold || scored.effect.is_periodic();
         let initial_guesses = if several { 2 } else { 1 };
-        if wanted && chosen.iter().filter(|c| c.effect.same_place(&scored.effect)).count() < initial_guesses {
+        if wanted && chosen.iter().filter(|c| c.effect.same_law(&scored.effect)).count() < initial_guesses {
             chosen.push(scored);
         }
     }
@@ -304,7 +304,7 @@ fn promising(screened: &[ScoreTest], [least, least_with_threshold]: [f64; 2]) ->
 #[cfg(test)]
 mod tests {
     use super::*;
-    use armgap_core::effect::find;
+    use armgap_core::effect::{find, find_form};
 
     fn test_of(joint: usize, gain: f64) -> ScoreTest {
         test_by("joint_elasticity", joint, gain)
@@ -325,6 +325,17 @@ mod tests {
         assert_eq!(names([10.0, 2.0]), ["torque_offset", "backlash"]);
         assert_eq!(names([2.0, 2.0]), ["torque_offset", "backlash", "stribeck"]);
         assert!(names([f64::INFINITY; 2]).is_empty());
+    }
+
+    #[test]
+    fn every_form_of_a_law_is_fitted() {
+        let name = "position_dependent_friction";
+        let twice = find_form::<f64>(name, "twice_per_turn").expect("known");
+        let form = ScoreTest::of(EffectInstance::new(twice, 0, [0.0; 3]), 6.0, 0.0);
+        let tests = [test_by(name, 0, 5.0), test_by(name, 0, 4.0), form];
+        let tests = tests.map(|test| ScoreTest { distinct: 1.0, ..test });
+        let gains: Vec<f64> = promising(&tests, [1.0; 2]).iter().map(|test| test.gain).collect();
+        assert_eq!(gains, [6.0, 5.0]);
     }
 
     #[test]

@@ -69,6 +69,11 @@ impl EffectInstance {
         self.law.spec().name == other.law.spec().name && self.joint == other.joint
     }
 
+    /// Whether `other` is the same effect on the same joint with the same form of its law, at any parameter values.
+    pub fn same_law(&self, other: &Self) -> bool {
+        self.law.spec().title == other.law.spec().title && self.joint == other.joint
+    }
+
     /// Whether the effect is a contact, acting beyond a position: its parameters are position, stiffness and damping.
     pub fn is_contact(&self) -> bool {
         self.law.spec().parameters.first().is_some_and(|p| p.quantity == Quantity::Reach)
