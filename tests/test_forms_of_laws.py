@@ -9,6 +9,7 @@ import pytest
 
 from armgap import Arm, Diagnosis, Log, diagnose, simulate
 from armgap.evidence.hypothesis import Hypothesis
+from armgap.export.correction import correct
 from armgap.simulation import Effect
 
 REAL = np.array([0.052, 0.58, 0.018, 0.11])  # kg m^2, N m, N m s/rad, N m
@@ -64,3 +65,8 @@ def test_forms_differ_and_the_first_is_the_default() -> None:
         named = run(3, replace(effect, parameters=plain | {form: 0.0}), 2.0)
         np.testing.assert_allclose(named.q, first.q, atol=1e-6)
         assert np.abs(run(3, effect, 2.0).q - first.q).max() > 1e-3
+
+
+def test_an_export_states_the_form() -> None:
+    remarks = correct(found(FORMS["load"]), ARM).remarks("toml")
+    assert any("load_dependent_friction" in line and "shape torque" in line for line in remarks)

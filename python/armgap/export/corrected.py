@@ -132,7 +132,7 @@ def placed(found: Cause | Equivalent) -> str:
 
 def _named(cause: Cause) -> str:
     sizes = ", ".join(f"{name} {v.value:.6g} {v.unit}".removesuffix(" 1") for name, v in cause.parameters.items())
-    return f"{placed(cause)} ({sizes})"
+    return f"{placed(cause)} ({sizes}{f', shape {cause.shape}' if cause.shape else ''})"
 
 
 def _equation(cause: Cause) -> str:

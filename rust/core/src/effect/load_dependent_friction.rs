@@ -15,7 +15,7 @@ pub struct LoadDependentFriction {
 static SPEC: Spec = Spec {
     name: "load_dependent_friction",
     title: "friction that grows with load",
-    equation: "f = mu |load| sgn dq; load = C dq + g, of serial arms M ddq + C dq + g of the links",
+    equation: "f = mu |load| sgn dq; load = C dq + g, or with shape torque tau, of serial arms M ddq + C dq + g of the links",
     source: "Hamon, Gautier and Garrec 2010",
     excited_by: "motion in both directions under different loads",
     parameters: &[EffectParameter::signed("mu", Quantity::Ratio)],

@@ -14,7 +14,7 @@ pub struct PositionDependentFriction {
 static SPEC: Spec = Spec {
     name: "position_dependent_friction",
     title: "friction that varies with position",
-    equation: "f = (a cos q + b sin q) sgn dq",
+    equation: "f = (a cos q + b sin q) sgn dq, or with shape twice_per_turn of 2q",
     source: "Bittencourt and Gunnarsson 2012",
     excited_by: "motion in both directions through different positions",
     parameters: &[
