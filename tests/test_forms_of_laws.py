@@ -67,6 +67,12 @@ def test_forms_differ_and_the_first_is_the_default() -> None:
         assert np.abs(run(3, effect, 2.0).q - first.q).max() > 1e-3
 
 
+def test_a_form_of_another_effect_is_refused() -> None:
+    for name, values in (("stribeck", {"amplitude": 0.1, "velocity": 0.1}), ("load_dependent_friction", {"mu": 0.1})):
+        with pytest.raises(ValueError, match="has no parameter `twice`"):
+            run(3, Effect(name, 1, values | {"twice": 1.0}), 1.0)
+
+
 def test_an_export_states_the_form() -> None:
     remarks = correct(found(FORMS["load"]), ARM).remarks("toml")
     assert any("load_dependent_friction" in line and "shape torque" in line for line in remarks)

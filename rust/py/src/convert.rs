@@ -159,8 +159,10 @@ pub fn effect_instances(
             } else {
                 law
             };
-            let form = FORMS.into_iter().find(|(key, _)| values.remove(*key).is_some_and(|x| x != 0.0));
-            let law = form.and_then(|(_, form)| find_form::<f64>(&name, form)).unwrap_or(law);
+            // Of an effect without this form the key stays, and is refused below.
+            let asked =
+                |(key, form)| find_form::<f64>(&name, form).filter(|_| values.remove(key) > Some(0.0));
+            let law = FORMS.into_iter().find_map(asked).unwrap_or(law);
             let mut at_motor =
                 |name: &str| law.has_transmission() && values.remove(name).is_some_and(|x| x != 0.0);
             let (encoder_at_motor, friction_at_motor, rotor_rides) =
