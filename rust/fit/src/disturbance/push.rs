@@ -42,6 +42,9 @@ const UNCLEAR: f64 = 0.02;
 /// Least impulse of a push, in standard deviations of the impulse, for it to differ significantly from zero.
 const SIGNIFICANT_IMPULSE: f64 = 2.0;
 
+/// Time between two pulses on different joints up to which they are of one push, s.
+const MEANWHILE: f64 = 0.15;
+
 /// Shortest recording in which pushes are looked for, s.
 const SHORTEST_LOG: f64 = 1.5;
 
@@ -213,12 +216,17 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let whole = Track::joined(&pieces).filter(|t| t.t[t.len() - 1] - t.t[0] > SHORTEST_LOG);
         let residual = whole.and_then(|track| Residual::new(&self.arm, &track, state.model, &self.prior));
         let Some(found) = residual.and_then(|r| search(&r, state.remainder)) else { return Vec::new() };
+        let of = |bells: &[Bell], light: bool| -> Vec<Disturbance> {
+            let rough = |bell| Some(Disturbance { light, ..self.rough(places, bell, found.rest)? });
+            bells.iter().filter_map(rough).collect()
+        };
+        let rough = [of(&found.bells, false), of(&found.light, true)].concat();
         let mut disturbances: Vec<Disturbance> = Vec::new();
-        for (bells, light) in [(&found.bells, false), (&found.light, true)] {
-            for bell in bells {
-                let Some(rough) = self.rough(places, bell, found.rest) else { continue };
-                disturbances.extend(self.sized(Disturbance { light, ..rough }, state, own, &disturbances));
-            }
+        for (i, one) in rough.iter().enumerate() {
+            // A push on the last link acts on all joints: beside what it does on the others the one on this joint explains the motion.
+            let meanwhile = rough[i + 1..].iter().filter(|other| one.is_with(other));
+            let beside: Vec<Disturbance> = disturbances.iter().chain(meanwhile).cloned().collect();
+            disturbances.extend(self.sized(one.clone(), state, own, &beside));
         }
         let all = [found.bells, found.light].concat();
         disturbances.retain(|e| e.is_known() && !self.meets_an_end(e, &all));
@@ -321,6 +329,13 @@ impl Disturbance {
     /// Impulse of the push in standard deviations.
     pub fn clarity(&self) -> f64 {
         self.push.p[0].abs() / self.sigma[0]
+    }
+
+    /// Whether another push acts on another joint at the same time.
+    fn is_with(&self, other: &Self) -> bool {
+        self.place() == other.place()
+            && self.push.joint != other.push.joint
+            && (self.push.p[1] - other.push.p[1]).abs() < MEANWHILE
     }
 
     /// Casts doubt on the push beside a model that leaves the share `left`, 0 to 1, of the gap unexplained.
