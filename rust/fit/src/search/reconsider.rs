@@ -4,7 +4,7 @@
 //! gap ten times as large, the difference between the two is noise. And what an effect with more free values explained beyond one with fewer may have
 //! been due to a cause that was found later. So before a further cause is looked for, each rival replaces its cause in the model with all other
 //! causes. If it does as well with fewer values, it stays there: an elastic joint that stood for a rotor inertia and a lag is a rotor inertia once the
-//! lag is known. If it does better, the search is repeated from where the rival was passed over; the search that ends with the smaller prediction error
+//! lag is known, and one that stood for a rotor inertia and smoothed friction once friction is smoothed. If it does better, the search is repeated from where the rival was passed over; the search that ends with the smaller prediction error
 //! counts, if it has no more causes: while a gap remains, further causes may be added that only imitate it.
 
 use crate::likelihood::context::DiagnosisContext;
@@ -66,7 +66,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         max_causes: usize,
         seed: u64,
     ) -> Option<ModelSearch<N, P>> {
-        if search.causes.len() < 2 || search.turned {
+        // Smoothed friction is a nuisance, and yet an addition beside which a cause may look different.
+        if search.causes.len() + usize::from(search.regularised) < 2 || search.turned {
             return None;
         }
         let rival = self.better_rival(search, ended, seed)?;
