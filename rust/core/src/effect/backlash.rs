@@ -27,7 +27,7 @@ static SPEC: Spec = Spec {
     excited_by: "a transmitted torque that changes sign",
     parameters: &[
         EffectParameter::bounded("gap", Quantity::Position, 0.0, f64::INFINITY),
-        EffectParameter::shape("rotor_share", Quantity::Ratio, 0.005, 0.35),
+        EffectParameter::shape("rotor_share", Quantity::Ratio, 0.005, 0.8),
         EffectParameter::shape("riding", Quantity::Ratio, 0.0, 1.0),
     ],
     initial_guesses: &[

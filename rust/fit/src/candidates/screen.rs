@@ -25,6 +25,10 @@ const MOTOR_GUESSES: usize = 3;
 /// fits with both on one side may not come near, as friction at the motor of an elastic joint winds up the shaft, which an encoder at the link reads.
 const MIXED_GUESSES: usize = 2;
 
+/// One in this many initial guesses of an elastic joint is tried with a rotor that rides on the link before, while the model has no effects and the gear ratio
+/// is unknown: fits with a geared rotor may not come near where the rotor is as heavy as the link.
+const RIDING_GUESSES: usize = 3;
+
 /// Least share of an effect with a threshold that a score test suggests: below it the initial guess is too far from the effect for its trace to say more
 /// than that the effect is smaller.
 const MIN_SUGGESTED_SHARE: f64 = 0.02;
@@ -95,14 +99,16 @@ pub fn effect_instances<const N: usize>(
                     all.push(effect);
                     continue;
                 }
-                let tried = tried(&sides[joint]);
+                let tried = tried(&sides[joint], all_guesses && !effect.is_backlash());
+                let is_geared = tried.iter().any(|s| !s.rotor_rides);
                 for sides in &tried {
                     let mixed = tried.len() > 1 && sides.encoder_at_motor != sides.friction_at_motor;
-                    let one_in = match (all_guesses, mixed) {
+                    let one_in = match all_guesses {
                         _ if **sides == Sides::LINK => 1,
-                        (true, false) => 1,
-                        (true, true) => MIXED_GUESSES,
-                        (false, _) => MOTOR_GUESSES,
+                        true if is_geared && sides.rotor_rides => RIDING_GUESSES,
+                        true if mixed => MIXED_GUESSES,
+                        true => 1,
+                        false => MOTOR_GUESSES,
                     };
                     if guess % one_in == one_in / 2 {
                         all.push(effect.with_sides(**sides));
@@ -114,10 +120,11 @@ pub fn effect_instances<const N: usize>(
     all
 }
 
-/// Sides of encoder and friction with which a transmission is tried: those with a geared rotor, or all given sides if there are none of this kind.
-fn tried(sides: &[Sides]) -> Vec<&Sides> {
+/// Sides of encoder and friction with which a transmission is tried: those with a geared rotor, or all given sides if there are none of this kind or those
+/// with a `riding` rotor are asked for.
+fn tried(sides: &[Sides], riding: bool) -> Vec<&Sides> {
     let geared: Vec<&Sides> = sides.iter().filter(|s| !s.rotor_rides).collect();
-    if geared.is_empty() { sides.iter().collect() } else { geared }
+    if riding || geared.is_empty() { sides.iter().collect() } else { geared }
 }
 
 /// Score tests of all candidates around the fitted hypothesis `base`, with the Jacobian `jacobian` there.
@@ -399,13 +406,18 @@ mod tests {
         let all = [Sides::LINK, Sides::MOTOR, mixed, other];
         assert_eq!(arrangements("backlash", &all, true), [6, 6, 6]);
         assert_eq!(arrangements("backlash", &all, false), [6, 2, 4]);
-        assert_eq!(arrangements("joint_elasticity", &all, true), [9, 9, 8]);
-        assert_eq!(arrangements("joint_elasticity", &all, false), [9, 3, 6]);
+        assert_eq!(arrangements("joint_elasticity", &all, true), [17, 17, 16]);
+        assert_eq!(arrangements("joint_elasticity", &all, false), [17, 6, 12]);
         // Sides that the arm file states are tried with every guess.
         assert_eq!(arrangements("backlash", &[mixed], true), [0, 0, 6]);
         assert_eq!(arrangements("backlash", &[other], true), [0, 0, 6]);
-        assert_eq!(arrangements("joint_elasticity", &[other], true), [0, 0, 9]);
+        assert_eq!(arrangements("joint_elasticity", &[other], true), [0, 0, 17]);
         let rotor_rides = all.map(|sides| Sides { rotor_rides: true, ..sides });
-        assert_eq!(arrangements("joint_elasticity", &rotor_rides, true), [0, 0, 26]);
+        assert_eq!(arrangements("joint_elasticity", &rotor_rides, true), [0, 0, 50]);
+        // Where the gear ratio is unknown, riding rotors are tried too while the model has no effects; the coupling of backlash is a parameter.
+        let both = [all, rotor_rides].concat();
+        assert_eq!(arrangements("joint_elasticity", &both, true), [17, 17, 40]);
+        assert_eq!(arrangements("joint_elasticity", &both, false), [17, 6, 12]);
+        assert_eq!(arrangements("backlash", &both, true), [6, 6, 6]);
     }
 }
