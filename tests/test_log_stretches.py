@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from armgap import Arm, Log, diagnose, simulate
-from armgap.log.stretches import choose
+from armgap.log.stretches import choose, thinned
 
 
 def long_log(quiet: float = 0.8, name: str = "long") -> Log:
@@ -39,6 +39,26 @@ def test_the_budget_holds_and_rest_is_left_out():
     [said] = [f.message for f in parts[0].findings if f.kind == "stretches"]
     assert f"of 40000 samples over 200 s, {sum(len(p) for p in parts)} in {len(parts)} stretches" in said
     assert choose([log], budget=6000)[0].name == parts[0].name
+
+
+def test_a_thinned_log_has_the_torques_impulse_and_first_moment():
+    t = np.cumsum(np.random.default_rng(1).uniform(0.9e-3, 1.1e-3, 1000))
+    log = Log.from_arrays(t, np.sin(t), np.cos(7 * t), dq=np.cos(t), name="dense")
+    thin, t = thinned(log, 3), log.t
+    assert len(thin) == 333
+    for values in ("t", "q", "dq"):
+        np.testing.assert_array_equal(getattr(thin, values), getattr(log, values)[:999:3])
+    ends = np.append(t[1:], t[-1] + log.sample_period)
+    h, mid = ends - t, 0.5 * (t + ends)
+    for first, last in ((0, 3), (600, 603)):
+        k, own = first // 3, slice(first, last)
+        whole = ends[last - 1] - t[first]
+        assert thin.tau[k, 0] * whole == pytest.approx(h[own] @ log.tau[own, 0], rel=1e-12)
+        centre = t[first] + 0.5 * whole
+        assert thin.moment[k, 0] == pytest.approx((h * (mid - centre))[own] @ log.tau[own, 0], rel=1e-9, abs=1e-15)
+    assert thinned(log, 1) is log
+    references = Log.from_arrays(t, np.sin(t), None, q_ref=np.sin(t), name="references")
+    assert thinned(references, 3) is references
 
 
 def test_no_stretch_spans_a_gap():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,7 +71,13 @@ class Examined:
 
 
 def examine(
-    training: Sequence[Log], holdout: Sequence[Log], arm: Arm, *, horizon: float = 0.25, repair: bool = True
+    training: Sequence[Log],
+    holdout: Sequence[Log],
+    arm: Arm,
+    *,
+    horizon: float = 0.25,
+    repair: bool = True,
+    strangers: bool = True,
 ) -> Examined:
     """Check logs and arm file for known defects of input, by the fit of the arm to the logs with and without each defect.
 
@@ -85,6 +92,9 @@ def examine(
     repair : bool, default True
         Whether unambiguous defects are repaired: a torque column's factor, torques that come too late in the file. Otherwise they are
         reported as warnings.
+    strangers : bool, default True
+        Whether torques that no reading of the columns explains are an error at once. A diagnosis asks for that once it has tried its effects
+        (`unexplained_columns`): an elastic joint with its encoder at the motor may leave two thirds of the next joint's torque unexplained.
 
     Returns
     -------
@@ -94,7 +104,8 @@ def examine(
     now = Examined(list(training), list(holdout), arm, (), Corrections())
     if unusable := torque_is_position.find([*training, *holdout], arm):
         return replace(now, checks=tuple(unusable))
-    for step in (_reading, _shift, _dead):
+    read = partial(_reading, strangers=strangers)
+    for step in (read, _shift, _dead):
         now = step(now, horizon, repair)
         if now.contradictory:
             break
@@ -102,7 +113,7 @@ def examine(
     return replace(now, checks=tuple(sorted(now.checks, key=lambda check: order.index(check.severity))))
 
 
-def _reading(now: Examined, horizon: float, repair: bool) -> Examined:
+def _reading(now: Examined, horizon: float, repair: bool, *, strangers: bool) -> Examined:
     """Find another reading of the columns: a factor on torques, or a reading of `contradiction.READINGS`."""
     logs = [*now.training, *now.holdout]
     base = EquationError([Rows.of(log, now.arm) for log in logs], now.arm)
@@ -115,11 +126,11 @@ def _reading(now: Examined, horizon: float, repair: bool) -> Examined:
         said = [c if c.severity != "repaired" or repair else replace(c, severity="warning") for c in factors.checks]
         return _applied(replace(now, arm=_doubted(now.arm, factors)), applied, said)
     odd = stands.fit.share.max() >= _UNRELATED[0]
-    elastic = _beside_elasticity(stands.errors, logs, now.arm) if suspects or odd else stands.fit
+    elastic = _beside_elasticity(stands.errors, logs, now.arm) if suspects or (odd and strangers) else stands.fit
     suspects = [s for s in suspects if s.fit.cost < elastic.cost + _CLOSE_COST_DIFFERENCE]
     found = confirm(stands.fit, suspects, now.training, now.holdout, now.arm, horizon)
     if found is None:
-        return _applied(now, Corrections(), _strangers(elastic.share, now, horizon, 0))
+        return _applied(now, Corrections(), _strangers(elastic.share, now, horizon, 0) if strangers else [])
     return _applied(now, found.reading.corrections, [_said(found, now.arm, horizon)])
 
 
@@ -144,15 +155,19 @@ def unexplained_columns(
     list of Check
         One check of severity `error`, or no check.
     """
-    if relative < _UNPREDICTED[1]:
+    if relative < min(_UNPREDICTED):
         return []
     logs = [*training, *holdout]
     base = EquationError([Rows.of(log, arm) for log in logs], arm)
     if len(base) < FEWEST_ROWS:
         return []
-    elastic = base.of_torques(_beside_elasticity(base, logs, arm))
-    share = np.where(base.square >= drive_limit.DRIVEN * base.scale, elastic.share, 0.0)
-    return _strangers(share, Examined(list(training), list(holdout), arm, (), Corrections()), horizon, 1)
+    now = Examined(list(training), list(holdout), arm, (), Corrections())
+    elastic = _beside_elasticity(base, logs, arm)
+    of_what_moves = _strangers(elastic.share, now, horizon, 0)
+    if of_what_moves or relative < _UNPREDICTED[1]:
+        return of_what_moves
+    share = np.where(base.square >= drive_limit.DRIVEN * base.scale, base.of_torques(elastic).share, 0.0)
+    return _strangers(share, now, horizon, 1)
 
 
 def _strangers(share: Array, now: Examined, horizon: float, pair: int) -> list[Check]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -23,7 +24,7 @@ from armgap.files.reading import printable
 from armgap.log import gather
 from armgap.log.conversion.columns import no_controller
 from armgap.log.log import Log
-from armgap.log.stretches import choose
+from armgap.log.stretches import BUDGET, SHORTEST_S, choose, thinned
 
 __all__ = ["PreparedInput", "prepare", "refused", "split"]
 
@@ -125,7 +126,10 @@ def _given(
 
 def _examined(given: PreparedInput, horizon: float, *, repair: bool) -> PreparedInput:
     """Choose stretches of long logs, and check logs and arm file for known defects."""
-    training, held = (choose(group, horizon=horizon) for group in (given.training, given.holdout))
+    training, held = (
+        choose(_within_budget(group) if given.arm.chain is not None else group, horizon=horizon)
+        for group in (given.training, given.holdout)
+    )
     for log in (*training, *held):
         if log.duration < horizon:
             raise LogShapeError(
@@ -148,7 +152,7 @@ def _examined(given: PreparedInput, horizon: float, *, repair: bool) -> Prepared
             shift=corrections.shift.get("tau", 0.0),
         )
     try:
-        found = examine(training, held, given.arm, horizon=horizon, repair=repair)
+        found = examine(training, held, given.arm, horizon=horizon, repair=repair, strangers=False)
     except ValueError as error:
         raise refused(str(error), training, held) from None
     checks = (*found.checks, *given.checks)
@@ -161,6 +165,13 @@ def _examined(given: PreparedInput, horizon: float, *, repair: bool) -> Prepared
         factors=found.corrections.factor,
         shift=found.corrections.shift.get("tau", 0.0),
     )
+
+
+def _within_budget(logs: Sequence[Log]) -> list[Log]:
+    """Return logs with fewer samples, as far as their sample period allows, where there are more than a diagnosis takes."""
+    samples, period = sum(len(log) for log in logs), min(log.sample_period for log in logs)
+    every = min(math.ceil(samples / BUDGET), round(SHORTEST_S / period))
+    return [thinned(log, every) for log in logs]
 
 
 def _repaired(

@@ -11,8 +11,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,10 +21,13 @@ from numpy.typing import NDArray
 from armgap.log.findings import Finding
 from armgap.log.log import Log
 
-__all__ = ["BUDGET", "STRETCH", "STRETCH_S", "choose"]
+__all__ = ["BUDGET", "SHORTEST_S", "STRETCH", "STRETCH_S", "choose", "thinned"]
 
 BUDGET = 24_000
 """Largest number of samples of all training logs, or of all holdout logs, that are diagnosed whole; of longer logs stretches are chosen."""
+
+SHORTEST_S = 0.002
+"""Shortest sample period of a serial arm's logs [s] for which logs beyond the budget are cut into stretches; denser logs are thinned before."""
 
 STRETCH_S = 2.0
 """Length of a stretch of a long log [s]."""
@@ -83,6 +87,32 @@ def choose(logs: Sequence[Log], budget: int = BUDGET, *, horizon: float = 0.25) 
         for i, whole in enumerate(logs)
         for log in _parts(whole, [pieces[k][1:] for k in chosen if pieces[k][0] == i])
     ]
+
+
+def thinned(log: Log, every: int) -> Log:
+    """Return a log with one in `every` of its samples and the mean of the torques in between, each held until the next sample.
+
+    A remainder of less than `every` samples at the end is left out. Logs with references in place of torques are not thinned, as
+    their controllers act at every sample.
+    """
+    if every < 2 or len(log) < 2 * every or not log.has_torques:
+        return log
+    kept = len(log) // every
+    at = every * np.arange(kept)
+    ends = np.append(log.t[1:], log.t[-1] + log.sample_period)[: kept * every]
+    begins = log.t[: kept * every]
+    h = (ends - begins).reshape(kept, every, 1)
+    whole = h.sum(axis=1)
+    tau = log.tau[: kept * every].reshape(kept, every, -1)
+    mean = (h * tau).sum(axis=1) / whole
+    off_centre = (0.5 * (begins + ends)).reshape(kept, every, 1) - (begins[::every, None] + 0.5 * whole)[:, None]
+    moment = (h * tau * off_centre).sum(axis=1)
+    if log.moment is not None:
+        moment = moment + log.moment[: kept * every].reshape(kept, every, -1).sum(axis=1)
+    columns = ("q", "dq", "tau_meas", "q_link")
+    arrays: dict[str, Any] = {key: None if (x := getattr(log, key)) is None else x[at] for key in columns}
+    said = Finding("stretches", f"one in {every} samples is used, with the mean of the torques in between")
+    return replace(log, t=log.t[at], tau=mean, moment=moment, findings=(*log.findings, said), **arrays)
 
 
 def _cut(index: int, log: Log, length_s: float, budget: int) -> list[tuple[int, int, int]]:

@@ -26,6 +26,9 @@ _FEWEST_PERIODS = 5
 MOST_INTERVALS = 4000
 # Number of rows that count as one independent row: neighbouring test functions overlap, and residuals are correlated over some tenths of a second.
 _CORRELATED = 12.0
+# Speed, relative to a joint's RMS speed, below which the joint counts as at rest; part of a row's intervals that it may be so slow in, as where it
+# reverses.
+_AT_REST, _SLOW_PART = 0.01, 0.2
 # Iterations in which the weights of the joints are set from their residuals.
 _WEIGHT_ITERATIONS = 4
 
@@ -67,12 +70,15 @@ class LogRows:
         Regressor of the torques on the parameters: ten per link, then rotor inertias, viscous and Coulomb friction.
     first, last : ndarray, shape (n_rows,)
         First and last sample of the log that a row depends on.
+    moves : ndarray of bool, shape (n_rows, n_joints)
+        Whether each joint moves for nearly all of a row: the dry friction of a joint at rest is unknown.
     """
 
     y: Array
     psi: Array
     first: NDArray[np.int64]
     last: NDArray[np.int64]
+    moves: NDArray[np.bool_]
 
     @classmethod
     def of(cls, log: Log, arm: Arm, begin: int, end: int) -> LogRows | None:
@@ -108,11 +114,14 @@ class LogRows:
         for k in range(2 * taps):
             at = starts + k
             psi += weight[k] * rest[at] - rise[k] * momentum[at]
-        return cls(torque, psi, begin + starts, begin + starts + 2 * taps)
+        is_slow = np.abs(dq) < _AT_REST * np.sqrt((dq**2).mean(axis=0))
+        slow = np.concatenate([np.zeros((1, n)), np.cumsum(is_slow, axis=0)])
+        moves = slow[starts + 2 * taps] - slow[starts] < _SLOW_PART * 2 * taps
+        return cls(torque, psi, begin + starts, begin + starts + 2 * taps, moves)
 
     def at(self, mask: NDArray[np.bool_]) -> LogRows:
         """Return the rows that are marked in `mask`, shape (n_rows,)."""
-        return LogRows(self.y[mask], self.psi[mask], self.first[mask], self.last[mask])
+        return LogRows(self.y[mask], self.psi[mask], self.first[mask], self.last[mask], self.moves[mask])
 
 
 @dataclass(frozen=True)
@@ -190,9 +199,12 @@ def fit(logs: Sequence[Log], arm: Arm) -> Fit | None:
     return None if rows is None else rows.fit(arm, np.ones(arm.n_joints))
 
 
-def rows_of(logs: Sequence[Log], arm: Arm) -> list[tuple[Log, LogRows]]:
-    """Return the logs that are long enough for a row, each with the rows of its middle; `MOST_INTERVALS` in all logs together."""
-    most = MOST_INTERVALS // len(logs)
+def rows_of(logs: Sequence[Log], arm: Arm, most: int | None = None) -> list[tuple[Log, LogRows]]:
+    """Return the logs that are long enough for a row, each with the rows of its middle.
+
+    These are of `most` sample intervals of each log, or by default of `MOST_INTERVALS` in all logs together.
+    """
+    most = MOST_INTERVALS // len(logs) if most is None else most
     return [(log, rows) for log in logs if (rows := LogRows.of(log, arm, *_middle(log, most))) is not None]
 
 
