@@ -293,8 +293,8 @@ pub fn serial_arm(arm: &Bound<'_, PyDict>) -> PyResult<SerialArm> {
     let controller = get::<Bound<'_, PyDict>>(arm, "controller")?;
     let limits: Option<Vec<f64>> = get(arm, "torque_limit")?;
     let controller = controller.map(|table| position_controller(&table, limits, n)).transpose()?;
-    let encoder_at_motor = get(arm, ENCODER_SIDE)?;
-    Ok(SerialArm { chain, theta, sigma, steps, encoder_at_motor, controller })
+    let (encoder_at_motor, friction_at_motor) = (get(arm, ENCODER_SIDE)?, get(arm, FRICTION_SIDE)?);
+    Ok(SerialArm { chain, theta, sigma, steps, encoder_at_motor, friction_at_motor, controller })
 }
 
 /// Position controller of `n` joints from a dict of lists; a list that is missing has no effect.

@@ -253,9 +253,9 @@ _ON_LINK = {"payload": _payload, "nominal_link": _nominal_link}
 
 def _turned(cause: Cause) -> Array:
     """Return the rotation of the base, shape (3, 3), for a tilt given as a rotation vector about horizontal axes."""
-    x, y = value(cause, "x"), value(cause, "y")
-    angle = math.hypot(x, y)
-    return np.eye(3) if angle == 0 else about_axis(np.array([x, y, 0.0]) / angle, angle)
+    turn = np.array([value(cause, axis) if axis in cause.parameters else 0.0 for axis in "xyz"])
+    angle = float(np.linalg.norm(turn))
+    return np.eye(3) if angle == 0 else about_axis(turn / angle, angle)
 
 
 def _exceeded(chain: SerialChain, diagnosis: Diagnosis) -> tuple[str, ...]:

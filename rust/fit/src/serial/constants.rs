@@ -19,6 +19,14 @@ pub const PRICE: f64 = 12.0;
 /// training logs accept, one passes by chance.
 pub const HOLDOUT_DEVIATIONS: f64 = 3.0;
 
+/// Number of standard deviations by which the size of a term that is computed from logged torques, estimated with an instrument, has to exceed zero. On
+/// eight of nine simulated elastic joints it is 3.8 to 17 and on one 2.7; on 24 joints without elasticity a computation of its own had 3.4 at most in size.
+pub const INSTRUMENTED_DEVIATIONS: f64 = 3.5;
+
+/// Largest difference between the sizes of such a term with and without an instrument, relative to the latter: 0.44 at most on the nine elastic joints, and
+/// 3.9 on a joint next to an elastic one.
+pub const INSTRUMENTED_DIFFERENCE: f64 = 0.5;
+
 /// Smallest share, 0 to 1, of the squared holdout residuals of at least one joint that a term of the model has to remove to be accepted.
 pub const MATTERS: f64 = 0.1;
 
@@ -29,6 +37,10 @@ pub const CONSEQUENCE: f64 = 0.005;
 /// RMS prediction error of a serial arm, relative to the RMS motion within a window, below which a gap is of no consequence: what small random torques
 /// on geared joints leave, besides encoder noise. Torques of 0.4 to 1 % of each joint's left 0.006 to 0.019 on twelve simulated arms without an effect.
 pub const CONSEQUENTIAL_SERIAL_ERROR: f64 = 0.02;
+
+/// Least ratio of an error of predictions on the training logs to that on the holdout, both relative to the motion, at which only the training logs show a
+/// gap. At 0 three of 70 simulated sets of logs with random torques alike in both were said to.
+pub const ONLY_THERE: f64 = 2.0;
 
 /// Least deflection of presliding friction (amplitude over stiffness) in encoder steps: a smaller one is dry friction to these logs. A fit to a friction
 /// that grows with the root of the speed gave a sixth of a step, with a probability of 0.97.

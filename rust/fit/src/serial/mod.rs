@@ -28,6 +28,7 @@ use crate::result::report::Diagnosis;
 use armgap_core::chain::{Chain, ChainJoint, JointKind, PARAMETERS_PER_JOINT};
 use armgap_core::effect::{Quantity, Scope, Trial, dead_zone_with_jump};
 use controller::{PositionController, commanded};
+use predict::horizontal_axes;
 use pushes::Event;
 use search::{Found, Motion, Search};
 use std::time::Instant;
@@ -54,6 +55,8 @@ pub struct SerialArm {
     pub steps: Option<Vec<f64>>,
     /// Whether the encoder of each joint is on the motor's side of its transmission; `None` where that is unknown.
     pub encoder_at_motor: Option<Vec<Option<bool>>>,
+    /// Whether the friction of each joint is on the motor's side of its transmission; `None` where that is unknown.
+    pub friction_at_motor: Option<Vec<Option<bool>>>,
     /// Position controllers of the arm's joints, needed for logs that hold references in place of torques; `None` where the arm file has none.
     pub controller: Option<PositionController>,
 }
@@ -115,6 +118,10 @@ impl<const N: usize, const P: usize> Motion for Equation<N, P> {
         Equation::signal(self, term, &theta)
     }
 
+    fn instrument(&self, term: &Term, theta: &[f64]) -> Option<Signal> {
+        Equation::instrument(self, term, &std::array::from_fn(|i| theta[i]))
+    }
+
     fn table_variable(&self, form: TableForm) -> Vec<[f64; 2]> {
         Self::table_variable(self, form)
     }
@@ -162,16 +169,17 @@ impl Request<'_> {
         training.equation.regularise(&widths);
         holdout.equation.regularise(&widths);
         let mut candidates = candidates(&arm, &theta, &training.data.tracks, self.options.known_units);
-        if let Some(sides) = &self.arm.encoder_at_motor {
-            let is_possible = |term: &Term| match &term.kind {
-                TermKind::Transmission(law) => {
-                    sides[law.joint].is_none_or(|at_motor| at_motor == law.encoder_at_motor)
-                }
-                _ => true,
-            };
-            for group in &mut candidates {
-                group.retain(is_possible);
-            }
+        let of = |sides: &Option<Vec<Option<bool>>>, j: usize| sides.as_ref().and_then(|sides| sides[j]);
+        let is_possible = |term: &Term| {
+            let TermKind::Transmission(law) = &term.kind else { return true };
+            let encoder = of(&self.arm.encoder_at_motor, law.joint);
+            let friction =
+                of(&self.arm.friction_at_motor, law.joint).filter(|_| law.compliance == Compliance::Backlash);
+            encoder.is_none_or(|side| side == law.encoder_at_motor)
+                && friction.is_none_or(|side| side == law.friction_at_motor)
+        };
+        for group in &mut candidates {
+            group.retain(is_possible);
         }
         if self.options.half_width.is_some() {
             candidates.retain(|group| !constants::ROUNDED_BY_LOW_PASS.contains(&group[0].name()));
@@ -410,8 +418,7 @@ fn candidates<const N: usize, const P: usize>(
     }
     for joint in 0..N {
         for compliance in [Compliance::Elastic, Compliance::Backlash] {
-            let laws =
-                [true, false].map(|encoder_at_motor| TransmissionLaw { joint, encoder_at_motor, compliance });
+            let laws = TransmissionLaw::on_all_sides(joint, compliance);
             groups.push(
                 laws.iter()
                     .flat_map(|law| {
@@ -423,7 +430,7 @@ fn candidates<const N: usize, const P: usize>(
     }
     groups.extend(row_term::candidates(&arm.joints().iter().map(|joint| joint.kind).collect::<Vec<_>>()));
     if gravity > 0.0 {
-        groups.push(vec![Term::neutral(TermKind::BaseTilt)]);
+        groups.push(vec![Term::neutral(TermKind::BaseTilt(horizontal_axes(arm.gravity_vector())))]);
     }
     if known_units {
         groups.push(vec![Term::neutral(TermKind::Payload)]);

@@ -44,7 +44,7 @@ impl<const N: usize, const P: usize> Model<N, P> {
                     model.hypothesis.theta[10 * N + j] -= taken;
                     model.hypothesis.effects.push(effect);
                 }
-                TermKind::BaseTilt => model.arm = turned(&model.arm, [term.p[0], term.p[1]]),
+                TermKind::BaseTilt(axes) => model.arm = turned(&model.arm, axes, [term.p[0], term.p[1]]),
                 TermKind::Row(row) => model.rows.push((row, term.p)),
                 // Tables are compared with causes in the weak form only, controllers are in the closed loop, and the members of a term on several
                 // joints are visited one by one.
@@ -89,15 +89,23 @@ impl<const N: usize, const P: usize> Model<N, P> {
     }
 }
 
-/// The arm with its base turned by `by`, the x and y components, rad, of a rotation vector in the base frame; in the base frame gravity turns the
-/// other way.
-pub fn turned<const N: usize>(arm: &Chain<f64, N>, by: [f64; 2]) -> Chain<f64, N> {
+/// The two axes of the base frame, 0 for x to 2 for z, that are closest to horizontal under `gravity`: turns about the third hardly change the torques.
+pub fn horizontal_axes(gravity: &[f64; 3]) -> [usize; 2] {
+    let mut axes = [0, 1, 2];
+    axes.sort_by(|a, b| gravity[*a].abs().total_cmp(&gravity[*b].abs()));
+    [axes[0].min(axes[1]), axes[0].max(axes[1])]
+}
+
+/// The arm with its base turned by `by`, the components, rad, along two `axes` (0 for x to 2 for z) of a rotation vector in the base frame; in the base
+/// frame gravity turns the other way.
+pub fn turned<const N: usize>(arm: &Chain<f64, N>, axes: [usize; 2], by: [f64; 2]) -> Chain<f64, N> {
     let g = *arm.gravity_vector();
     let angle = by[0].hypot(by[1]);
     if angle == 0.0 {
         return *arm;
     }
-    let axis = [-by[0] / angle, -by[1] / angle, 0.0];
+    let mut axis = [0.0; 3];
+    axes.iter().zip(by).for_each(|(i, by)| axis[*i] = -by / angle);
     let cross =
         [axis[1] * g[2] - axis[2] * g[1], axis[2] * g[0] - axis[0] * g[2], axis[0] * g[1] - axis[1] * g[0]];
     let along: f64 = axis.iter().zip(&g).map(|(a, b)| a * b).sum();

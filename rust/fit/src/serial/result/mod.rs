@@ -18,7 +18,7 @@ use crate::result::report::{
 };
 use crate::result::training_gap::remark;
 use crate::result::verdict::{Evidence, is_improved, stands_out};
-use crate::serial::constants::CONSEQUENTIAL_SERIAL_ERROR;
+use crate::serial::constants::{CONSEQUENTIAL_SERIAL_ERROR, ONLY_THERE};
 use crate::serial::controller::PositionController;
 use crate::serial::controller::closed_loop::ClosedLoop;
 use crate::serial::predict::{Model, floor};
@@ -112,7 +112,7 @@ pub(crate) fn assemble<const N: usize, const P: usize>(
     let on_training = if none_stays { refit } else { with_causes };
     gap.training = (named.is_empty()
         && !stands_out(&gap.after, &gap.floor, &gap.motion, CONSEQUENTIAL_SERIAL_ERROR))
-    .then(|| training_gap(&training.data, &on_training))
+    .then(|| training_gap(&training.data, &on_training, &gap))
     .flatten();
     let evidence = Evidence {
         named: !named.is_empty(),
@@ -325,16 +325,22 @@ fn gap<const N: usize, const P: usize>(
     }
 }
 
-/// Errors of a model on the training logs; `None` where they are within noise or of no consequence in relation to the motion.
+/// Errors of a model on the training logs; `None` where they are within noise, of no consequence in relation to the motion, or no larger in relation to it
+/// than on the holdout, whose errors `gap` holds.
 fn training_gap<const N: usize, const P: usize>(
     data: &Dataset<N>,
     model: &Model<N, P>,
+    gap: &Gap,
 ) -> Option<TrainingErrors> {
     let measured = data.measured();
     let after = rms::<N>(&measured, &limited(&measured, &model.predict(data)));
     let noise = std::array::from_fn(|j| median(data.tracks.iter().map(|t| t.noise[j]).collect()));
     let floor: Vec<f64> = floor(data, &noise).iter().map(|v| v.sqrt()).collect();
-    stands_out(&after, &floor, &rms::<N>(&measured, &still(data)), CONSEQUENTIAL_SERIAL_ERROR)
+    let motion = rms::<N>(&measured, &still(data));
+    let of_holdout = |j: usize| ONLY_THERE * gap.after[j] * motion[j] / gap.motion[j];
+    let only_there: Vec<f64> =
+        (0..N).map(|j| if after[j] > of_holdout(j) { after[j] } else { 0.0 }).collect();
+    stands_out(&only_there, &floor, &motion, CONSEQUENTIAL_SERIAL_ERROR)
         .then_some(TrainingErrors { after, floor })
 }
 

@@ -2,7 +2,8 @@
 
 use crate::numeric::random::Random;
 use crate::serial::constants::{
-    CONSEQUENCE, HOLDOUT_DEVIATIONS, MATTERS, NOTICED, PRICE, RESAMPLES, RESTORES, RESTORES_EACH, SIGNIFICANT,
+    CONSEQUENCE, HOLDOUT_DEVIATIONS, INSTRUMENTED_DEVIATIONS, INSTRUMENTED_DIFFERENCE, MATTERS, NOTICED,
+    PRICE, RESAMPLES, RESTORES, RESTORES_EACH, SIGNIFICANT,
 };
 use crate::serial::search::Search;
 use crate::serial::search::fitting::Fitted;
@@ -36,6 +37,9 @@ pub struct Evidence {
     pub share: f64,
     /// RMS torque of the term where it acts ([`where_it_acts`]) relative to the RMS torque of the joint, for the joint with the largest ratio.
     pub consequence: f64,
+    /// Size of the term on the training logs by its instrument ([`Motion::instrument`]), relative to the fitted size, and the standard deviation; `None` for
+    /// terms without an instrument.
+    pub instrumented: Option<[f64; 2]>,
 }
 
 impl Evidence {
@@ -60,7 +64,15 @@ impl Evidence {
 
     /// Whether the term is accepted, for what it explains or for the arm file's values that it restores.
     pub fn is_accepted(&self) -> bool {
-        self.explains() || self.restores()
+        self.is_exogenous() && (self.explains() || self.restores())
+    }
+
+    /// Whether the term explains more than the disturbances that its own torque contains.
+    fn is_exogenous(&self) -> bool {
+        let beyond = |[size, sigma]: [f64; 2]| {
+            size > INSTRUMENTED_DEVIATIONS * sigma && (size - 1.0).abs() < INSTRUMENTED_DIFFERENCE
+        };
+        self.instrumented.is_none_or(beyond)
     }
 }
 
@@ -115,6 +127,10 @@ impl Search<'_> {
             deviations,
             share,
             consequence: where_it_acts(self.training.rows(), &signal),
+            instrumented: self
+                .training
+                .instrument(term, &with.estimate.theta)
+                .and_then(|instrument| regression.instrumented(&with.estimate, &signal, &instrument)),
         }
     }
 

@@ -23,6 +23,10 @@ pub trait Motion: Sync {
     fn rows(&self) -> &Rows;
     /// Torque of a term along the logs at the arm's parameters `theta`, by joint and row, N m or N.
     fn signal(&self, term: &Term, theta: &[f64]) -> Signal;
+    /// Torque of a term like [`Self::signal`], without what the logged torques contain of disturbances; `None` for terms that do not depend on them.
+    fn instrument(&self, _term: &Term, _theta: &[f64]) -> Option<Signal> {
+        None
+    }
     /// Factor and variable of a table's form in the middle of every sample interval, log after log.
     fn table_variable(&self, form: TableForm) -> Vec<[f64; 2]>;
     /// Torques of a table per unit of the torque of each class, by joint and row.
@@ -480,6 +484,7 @@ mod tests {
             deviations: 5.0,
             share: 0.5,
             consequence: 0.1,
+            instrumented: None,
         };
         assert!(good.is_accepted());
         for weak in [
@@ -489,9 +494,13 @@ mod tests {
             Evidence { deviations: 1.0, ..good },
             Evidence { share: 0.05, ..good },
             Evidence { consequence: 1e-3, ..good },
+            // A torque that is computed from logged torques, and without the disturbances in them explains nothing.
+            Evidence { instrumented: Some([0.1, 0.05]), ..good },
+            Evidence { instrumented: Some([0.9, 0.3]), ..good },
         ] {
             assert!(!weak.is_accepted(), "{weak:?}");
         }
+        assert!(Evidence { instrumented: Some([0.9, 0.1]), ..good }.is_accepted());
         let restoring = Evidence { relief: 30.0, statistic: 0.0, deviations: 0.0, share: 0.0, ..good };
         assert!(restoring.is_accepted());
         assert!(!Evidence { deviations: -3.0, ..restoring }.is_accepted());

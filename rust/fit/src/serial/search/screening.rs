@@ -46,7 +46,7 @@ impl Search<'_> {
                     let preload = difference(&far, &near, 1.0);
                     vec![near, preload]
                 }
-                TermKind::BaseTilt => {
+                TermKind::BaseTilt(_) => {
                     let none = self.training.signal(&term.with(vec![0.0; 2]), theta);
                     let at = |p: [f64; 2]| {
                         difference(&self.training.signal(&term.with(p.to_vec()), theta), &none, TILT_STEP)

@@ -36,8 +36,8 @@ pub enum TermKind {
     Law(EffectInstance),
     /// A point mass on the last link: parameters are the mass, kg, and the position in the link's frame, m.
     Payload,
-    /// Tilt of the base about the two horizontal axes, x and y, of the base frame, rad.
-    BaseTilt,
+    /// Tilt of the base about two axes of the base frame (0 for x, 1 for y, 2 for z), rad.
+    BaseTilt([usize; 2]),
     /// Difference of a link's mass, first moments and inertia from the nominal values; the number is the link's 0-based index.
     NominalLink(usize),
     /// Joint elasticity or backlash of a transmission; parameters are the compliance, rad/(N m) (m/N), and the retardation time, s, or the gap,
@@ -72,7 +72,7 @@ pub struct TermParameter {
 /// Torque of one class of a table.
 const CLASS: (&str, &str) = ("torque", "N m");
 const LOAD: [(&str, &str); 4] = [("mass", "kg"), ("com_x", "m"), ("com_y", "m"), ("com_z", "m")];
-const TURN: [(&str, &str); 2] = [("x", "rad"), ("y", "rad")];
+const TURN: [(&str, &str); 3] = [("x", "rad"), ("y", "rad"), ("z", "rad")];
 
 impl Term {
     /// A term of the equation of motion from an effect of the catalogue, with the parameters of `effect`.
@@ -86,7 +86,7 @@ impl Term {
         let count = match kind {
             TermKind::Law(effect) => effect.len(),
             TermKind::Payload => LOAD.len(),
-            TermKind::BaseTilt => TURN.len(),
+            TermKind::BaseTilt(axes) => axes.len(),
             TermKind::NominalLink(_) => LINK_NAMES.len(),
             TermKind::Transmission(law) => law.parameters(true).len(),
             TermKind::Controller(_) => 1,
@@ -102,7 +102,7 @@ impl Term {
         match self.kind {
             TermKind::Law(effect) => effect.law.spec().name,
             TermKind::Payload => "payload",
-            TermKind::BaseTilt => "base_tilt",
+            TermKind::BaseTilt(_) => "base_tilt",
             TermKind::NominalLink(_) => "nominal_link",
             TermKind::Transmission(law) => law.name(),
             TermKind::Controller(of) => of.setting.name(),
@@ -117,7 +117,7 @@ impl Term {
         match self.kind {
             TermKind::Law(effect) => effect.law.spec().title,
             TermKind::Payload => "payload on the last link",
-            TermKind::BaseTilt => "base not level",
+            TermKind::BaseTilt(_) => "base not level",
             TermKind::NominalLink(_) => "wrong nominal link",
             TermKind::Transmission(law) => law.title(),
             TermKind::Controller(of) => of.setting.title(),
@@ -135,7 +135,7 @@ impl Term {
             TermKind::Transmission(law) => Some(law.joint + 1),
             TermKind::Controller(of) => Some(of.joint + 1),
             TermKind::Table(ref table) => Some(table.joint + 1),
-            TermKind::Payload | TermKind::BaseTilt | TermKind::Joints(_) | TermKind::Row(_) => None,
+            TermKind::Payload | TermKind::BaseTilt(_) | TermKind::Joints(_) | TermKind::Row(_) => None,
         }
     }
 
@@ -215,7 +215,7 @@ impl Term {
                 all[0].bounds[0] = 0.0;
                 all
             }
-            TermKind::BaseTilt => TURN.iter().map(free).collect(),
+            TermKind::BaseTilt(axes) => axes.iter().map(|axis| free(&TURN[*axis])).collect(),
             TermKind::NominalLink(_) => LINK_NAMES.iter().map(free).collect(),
             TermKind::Transmission(law) => law.parameters(rotary),
             TermKind::Controller(of) => vec![of.setting.parameter(rotary)],
@@ -242,7 +242,7 @@ impl Term {
                 }
             }
             TermKind::Payload | TermKind::Transmission(_) | TermKind::Controller(_) => 0,
-            TermKind::BaseTilt => TURN.len(),
+            TermKind::BaseTilt(axes) => axes.len(),
             TermKind::NominalLink(_) => LINK_NAMES.len(),
             TermKind::Joints(ref of) => of.members[0].amplitudes(),
             TermKind::Row(RowTerm { law: RowLaw::Transmission(_), .. }) => 3,
@@ -268,7 +268,7 @@ impl Term {
             TermKind::Law(effect) => effect.law.spec().scope == Scope::Joint,
             TermKind::Transmission(_) | TermKind::Controller(_) => true,
             TermKind::Payload
-            | TermKind::BaseTilt
+            | TermKind::BaseTilt(_)
             | TermKind::NominalLink(_)
             | TermKind::Joints(_)
             | TermKind::Row(_)

@@ -38,6 +38,8 @@ pub struct TransmissionLaw {
     pub joint: usize,
     /// Whether the joint's encoder measures the motor; else it measures the link.
     pub encoder_at_motor: bool,
+    /// Whether the joint's friction acts on the motor, where most of a gear's is; else it acts on the link.
+    pub friction_at_motor: bool,
     /// Law of the deflection between motor and link under the transmitted torque.
     pub compliance: Compliance,
 }
@@ -54,21 +56,50 @@ pub enum Compliance {
 /// Least and largest damping ratio of the rotor on its shaft in predictions: beyond them the estimate is taken as uncertain.
 const DAMPING: [f64; 2] = [0.02, 1.0];
 
-/// Natural frequencies of a joint's inertia on its shaft among the initial guesses of an elastic joint, rad/s: from the softest drives to those of
-/// which test functions see only that the deflection follows the torque. Up to 60 rad/s neighbours still explain most of each other's deflection; beyond, the
-/// deflection is in proportion to the compliance, and steps of four are enough.
-const LINK_FREQUENCIES: [f64; 10] = [8.0, 12.0, 18.0, 27.0, 40.0, 60.0, 120.0, 240.0, 480.0, 960.0];
+/// Natural frequency of a joint's inertia on its shaft in the initial guesses of an elastic joint, rad/s: the deflection is in proportion to the compliance.
+const LINK_FREQUENCY: f64 = 60.0;
 
-/// Damping ratio of a link on its shaft among the initial guesses of an elastic joint.
-const LINK_DAMPING: f64 = 0.1;
+/// Retardation times among the initial guesses of an elastic joint, s: steps of four, of which a fit finds those between.
+const RETARDATIONS_S: [f64; 4] = [0.0005, 0.002, 0.008, 0.03];
 
 /// Gaps among the initial guesses of backlash, relative to the standard deviation of the joint's positions: a fit finds a gap within a factor of two.
 const GAPS: [f64; 7] = [0.0025, 0.005, 0.01, 0.02, 0.04, 0.08, 0.16];
 
+/// Time for which motor and link stay together after an impact in a gap, s. The measured accelerations smear the impact over the width of the local cubics,
+/// and what they show of the body with the encoder after it would push the other body off the flank again.
+const SETTLING_S: f64 = 0.04;
+
 /// Rotor inertia that predictions assume for a motor without one in the arm file, relative to the joint's inertia.
 const ROTOR_SHARE: f64 = 0.03;
 
+/// From where the torque that an elastic shaft passes on is taken, for a joint whose encoder measures the motor.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Passed {
+    /// From the motor: its torque less those of its rotor and friction, which contains what disturbs the motor.
+    ByMotor,
+    /// From the link: what it needs to move with the motor, as over a stiff shaft.
+    Needed,
+}
+
 impl TransmissionLaw {
+    /// Whether the law's torque is computed from logged torques.
+    pub fn depends_on_logged_torques(&self) -> bool {
+        self.encoder_at_motor && self.compliance == Compliance::Elastic
+    }
+
+    /// Laws of one compliance on a joint, for encoder and friction on either side. Over an elastic shaft the side of the friction hardly matters; a body
+    /// in a gap is slowed by its own friction alone.
+    pub fn on_all_sides(joint: usize, compliance: Compliance) -> Vec<Self> {
+        let friction: &[bool] = if compliance == Compliance::Backlash { &[true, false] } else { &[true] };
+        let law = |encoder_at_motor, friction_at_motor| Self {
+            joint,
+            encoder_at_motor,
+            friction_at_motor,
+            compliance,
+        };
+        [true, false].iter().flat_map(|e| friction.iter().map(move |f| law(*e, *f))).collect()
+    }
+
     /// Effect of the library that the transmission term is simulated with: joint elasticity or backlash.
     fn effect(&self) -> &'static dyn Effect<f64> {
         let name = match self.compliance {
@@ -93,13 +124,10 @@ impl TransmissionLaw {
     pub fn guesses(self, scale: f64, inertia: f64) -> Vec<Term> {
         let term = |p: Vec<f64>| Term::neutral(TermKind::Transmission(self)).with(p);
         match self.compliance {
-            Compliance::Elastic => LINK_FREQUENCIES
-                .iter()
-                .map(|frequency| {
-                    let compliance = 1.0 / (inertia * frequency * frequency);
-                    term(vec![compliance, 2.0 * LINK_DAMPING / frequency])
-                })
-                .collect(),
+            Compliance::Elastic => {
+                let compliance = 1.0 / (inertia * LINK_FREQUENCY * LINK_FREQUENCY);
+                RETARDATIONS_S.iter().map(|retardation| term(vec![compliance, *retardation])).collect()
+            }
             Compliance::Backlash => GAPS.iter().map(|gap| term(vec![gap * scale])).collect(),
         }
     }
@@ -143,14 +171,15 @@ impl TransmissionLaw {
                 let damping = 2.0 * ratio.clamp(DAMPING[0], DAMPING[1]) * (stiffness * rotor_inertia).sqrt();
                 ([stiffness, damping, rotor_inertia], rotor)
             }
-            Compliance::Backlash => ([size, (rotor_inertia / inertia).clamp(0.005, 0.35), 0.0], 0.0),
+            Compliance::Backlash => ([size, (rotor_inertia / inertia).clamp(0.005, 0.8), 0.0], 0.0),
         };
         (EffectInstance::new(self.effect(), self.joint, p).with_sides(self.sides()), taken)
     }
 
-    /// Sides of encoder and friction: friction is at the motor, where most of a gear's is.
+    /// Sides of encoder and friction.
     pub(in crate::serial) fn sides(self) -> Sides {
-        if self.encoder_at_motor { Sides::MOTOR } else { Sides { friction_at_motor: true, ..Sides::LINK } }
+        let Self { encoder_at_motor, friction_at_motor, .. } = self;
+        Sides { encoder_at_motor, friction_at_motor, rotor_rides: false }
     }
 }
 
@@ -162,20 +191,21 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         law: &TransmissionLaw,
         p: &[f64],
         theta: &[f64; P],
+        passed: Passed,
     ) -> Signal {
         let (j, rotor) = (law.joint, theta[10 * N + law.joint]);
         if p[0] == 0.0 || !law.encoder_at_motor && rotor <= 0.0 {
             return vec![None; N];
         }
         let needs = self.computed.needs.of(theta, || self.link_needs(theta));
-        let Some(forcings) = self.forcings(law, theta, &needs) else { return vec![None; N] };
+        let Some(forcings) = self.forcings(law, theta, &needs, passed) else { return vec![None; N] };
         let along = |forcings: &Vec<Forcing>| match law.compliance {
             Compliance::Elastic => deflection::of_shaft(forcings, p[0], p[1]),
-            Compliance::Backlash => deflection::in_gap(forcings, p[0]),
+            Compliance::Backlash => deflection::in_gap(forcings, p[0], SETTLING_S),
         };
         let deflections: Vec<Vec<[f64; 2]>> = forcings.iter().map(along).collect();
         if !law.encoder_at_motor {
-            return self.of_motor(j, &deflections, theta);
+            return self.of_motor(law, &deflections, theta);
         }
         let derivatives =
             self.computed.derivatives.of(&(j, *theta), || self.link_derivatives(j, &Self::links(theta)));
@@ -201,27 +231,35 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         law: &TransmissionLaw,
         theta: &[f64; P],
         needs: &LinkNeeds<N>,
+        passed: Passed,
     ) -> Option<Vec<Vec<Forcing>>> {
         let j = law.joint;
+        let rotor = theta[10 * N + j];
         let at = |(m, [torque, inertia]): (&Middle<N>, &[SVector<f64, N>; 2])| {
             let (torque, inertia) = match (law.encoder_at_motor, law.compliance) {
-                // An estimate may leave the links without inertia for some poses; a shaft then follows its torque.
-                (true, Compliance::Elastic) => {
-                    return Some(Forcing { h: m.h, torque: torque[j], inertia: inertia[j].max(0.0) });
+                // A motor at rest has unknown friction.
+                (true, Compliance::Elastic) if passed == Passed::ByMotor => {
+                    (if m.rest[j] { f64::NAN } else { self.of_the_motor(m, j, theta, true) }, inertia[j])
                 }
-                (true, Compliance::Backlash) => (torque[j], inertia[j]),
-                // The link's motion is known, and with it what the shaft passes on.
-                (false, Compliance::Elastic) => {
-                    return Some(Forcing { h: m.h, torque: torque[j], inertia: 0.0 });
-                }
+                (_, Compliance::Elastic) => (torque[j], inertia[j]),
+                (true, Compliance::Backlash) if law.friction_at_motor => (torque[j], inertia[j]),
+                (true, Compliance::Backlash) => (torque[j] + self.friction(m, j, theta), inertia[j]),
                 // A motor at rest has unknown friction: it carries what the link needs.
-                (false, Compliance::Backlash) if m.rest[j] => (torque[j], theta[10 * N + j]),
-                (false, Compliance::Backlash) => (self.motor_torque(m, j, theta), theta[10 * N + j]),
+                (false, Compliance::Backlash) if law.friction_at_motor && m.rest[j] => (torque[j], rotor),
+                (false, Compliance::Backlash) => {
+                    (self.of_the_motor(m, j, theta, law.friction_at_motor), rotor)
+                }
             };
-            (inertia > 0.0).then_some(Forcing { h: m.h, torque, inertia })
+            (law.compliance == Compliance::Elastic || inertia > 0.0).then_some(Forcing {
+                h: m.h,
+                torque,
+                inertia,
+            })
         };
         let along = |(log, needs): (&Intervals<N>, &Vec<[SVector<f64, N>; 2]>)| {
-            log.middles.iter().zip(needs).map(at).collect::<Option<Vec<Forcing>>>()
+            let mut forcings = log.middles.iter().zip(needs).map(at).collect::<Option<Vec<Forcing>>>()?;
+            bridge(&mut forcings);
+            Some(forcings)
         };
         self.logs().iter().zip(needs).map(along).collect()
     }
@@ -233,10 +271,15 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         links
     }
 
-    /// Torque that the motor of joint `j` passes on along the measured motion, N m or N: the motor's torque less those of rotor inertia and friction.
-    fn motor_torque(&self, m: &Middle<N>, j: usize, theta: &[f64; P]) -> f64 {
-        let friction = self.arm.friction(theta, &SVector::from(m.dq))[j];
+    /// Torque that the motor of joint `j` has left for the link, N m or N: its torque less those of its rotor and, where friction is `at_motor`, of friction.
+    fn of_the_motor(&self, m: &Middle<N>, j: usize, theta: &[f64; P], at_motor: bool) -> f64 {
+        let friction = if at_motor { self.friction(m, j, theta) } else { 0.0 };
         m.tau[j] - theta[10 * N + j] * m.ddq[j] - friction
+    }
+
+    /// Friction torque of joint `j` at the measured velocity, N m or N.
+    fn friction(&self, m: &Middle<N>, j: usize, theta: &[f64; P]) -> f64 {
+        self.arm.friction(theta, &SVector::from(m.dq))[j]
     }
 
     /// Change of the links' torque by joint and row of the weak form, to first order, where the encoder of joint `j` measures the motor and the link
@@ -299,10 +342,12 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         self.logs().iter().map(along).collect()
     }
 
-    /// Change of the torque of rotor inertia and viscous friction, by joint and row of the weak form, where the encoder of joint `j` measures the
-    /// link and the motor leads by the deflection; `deflections` holds deflection and rate by log and sample interval.
-    fn of_motor(&self, j: usize, deflections: &[Vec<[f64; 2]>], theta: &[f64; P]) -> Signal {
-        let (rotor, viscous) = (theta[10 * N + j], self.arm.viscous(theta)[j]);
+    /// Change of the torque of rotor inertia and viscous friction at the motor, by joint and row of the weak form, where the encoder measures the link
+    /// and the motor leads by the deflection; `deflections` holds deflection and rate by log and sample interval.
+    fn of_motor(&self, law: &TransmissionLaw, deflections: &[Vec<[f64; 2]>], theta: &[f64; P]) -> Signal {
+        let j = law.joint;
+        let rotor = theta[10 * N + j];
+        let viscous = if law.friction_at_motor { self.arm.viscous(theta)[j] } else { 0.0 };
         let changes: Vec<Vec<[SVector<f64, N>; 2]>> = deflections
             .iter()
             .map(|log| {
@@ -317,6 +362,25 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         let mut signal = self.weak_parts(&changes);
         (0..N).filter(|k| *k != j).for_each(|k| signal[k] = None);
         signal
+    }
+}
+
+/// Replaces torques that are not known by a line between their neighbours: a step would be an impulse on the joints that move with the deflection.
+fn bridge(forcings: &mut [Forcing]) {
+    let known: Vec<usize> = (0..forcings.len()).filter(|k| forcings[*k].torque.is_finite()).collect();
+    let (Some(first), Some(last)) = (known.first(), known.last()) else {
+        forcings.iter_mut().for_each(|forcing| forcing.torque = 0.0);
+        return;
+    };
+    let ends = [forcings[*first].torque, forcings[*last].torque];
+    forcings[..*first].iter_mut().for_each(|forcing| forcing.torque = ends[0]);
+    forcings[*last..].iter_mut().for_each(|forcing| forcing.torque = ends[1]);
+    for pair in known.windows(2) {
+        let [a, b] = [pair[0], pair[1]].map(|k| forcings[k].torque);
+        for k in pair[0] + 1..pair[1] {
+            let part = (k - pair[0]) as f64 / (pair[1] - pair[0]) as f64;
+            forcings[k].torque = a + part * (b - a);
+        }
     }
 }
 
@@ -387,7 +451,20 @@ mod tests {
             assert!(residual.len() > 200);
             (residual.iter().map(|r| r * r).sum::<f64>() / residual.len() as f64).sqrt()
         };
-        [rms(&vec![None]), rms(&equation.of_transmission(&law, p, &theta))]
+        [rms(&vec![None]), rms(&equation.of_transmission(&law, p, &theta, Passed::ByMotor))]
+    }
+
+    #[test]
+    fn unknown_torques_lie_on_a_line_between_their_neighbours() {
+        let nan = f64::NAN;
+        let bridged = |torques: &[f64]| -> Vec<f64> {
+            let mut all: Vec<Forcing> =
+                torques.iter().map(|torque| Forcing { h: 1e-3, torque: *torque, inertia: 1.0 }).collect();
+            bridge(&mut all);
+            all.iter().map(|forcing| forcing.torque).collect()
+        };
+        assert_eq!(bridged(&[nan, 1.0, nan, nan, 4.0, nan]), [1.0, 1.0, 2.0, 3.0, 4.0, 4.0]);
+        assert_eq!(bridged(&[nan, nan]), [0.0, 0.0]);
     }
 
     #[test]
@@ -395,7 +472,12 @@ mod tests {
         let [stiffness, damping] = [90.0, 0.6];
         let bodies = two_bodies(|deflection, rate| stiffness * deflection + damping * rate);
         for encoder_at_motor in [true, false] {
-            let law = TransmissionLaw { joint: 0, encoder_at_motor, compliance: Compliance::Elastic };
+            let law = TransmissionLaw {
+                joint: 0,
+                encoder_at_motor,
+                friction_at_motor: true,
+                compliance: Compliance::Elastic,
+            };
             let [rigid, elastic] = left(law, &[1.0 / stiffness, damping / stiffness], &bodies);
             assert!(elastic < 0.05 * rigid, "{encoder_at_motor}: {rigid} {elastic}");
         }
@@ -411,7 +493,12 @@ mod tests {
             if depth > 0.0 { push.max(0.0) * deflection.signum() } else { 0.0 }
         });
         for encoder_at_motor in [true, false] {
-            let law = TransmissionLaw { joint: 0, encoder_at_motor, compliance: Compliance::Backlash };
+            let law = TransmissionLaw {
+                joint: 0,
+                encoder_at_motor,
+                friction_at_motor: true,
+                compliance: Compliance::Backlash,
+            };
             let [rigid, free] = left(law, &[gap], &bodies);
             assert!(free < 0.5 * rigid, "{encoder_at_motor}: {rigid} {free}");
             // Accelerations of local cubics smear the impacts: the best gap is within a quarter of the true one with the encoder at the motor, and a

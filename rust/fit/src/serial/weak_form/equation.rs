@@ -5,6 +5,7 @@ use crate::model::hypothesis::EffectInstance;
 use crate::serial::controller::commanded::Commanded;
 use crate::serial::predict::turned;
 use crate::serial::term::transmission::Computed;
+use crate::serial::term::transmission::Passed;
 use crate::serial::term::{Term, TermKind, of_load};
 use crate::serial::weak_form::intervals::{Intervals, Middle, TestFunction};
 use crate::serial::weak_form::rows::{JointRows, Rows, Signal, sum};
@@ -187,7 +188,29 @@ impl<const N: usize, const P: usize> Equation<N, P> {
     /// Torque of a term by joint and row of the weak form, N m or N, on the left-hand side of the equation of motion: added to the torque of the
     /// arm's own parameters.
     pub fn signal(&self, term: &Term, theta: &[f64; P]) -> Signal {
-        let mut signal = self.signal_with_mean(term, theta);
+        self.centred(self.signal_with_mean(term, theta))
+    }
+
+    /// Torque of an elastic joint with its encoder at the motor on this joint alone, from the torque that the measured motion needs in place of the one that the
+    /// motor passes on; `None` for other terms. On other joints their own elasticity is in the way.
+    pub fn instrument(&self, term: &Term, theta: &[f64; P]) -> Option<Signal> {
+        match &term.kind {
+            TermKind::Transmission(law) if law.depends_on_logged_torques() => {
+                let mut signal = self.centred(self.of_transmission(law, &term.p, theta, Passed::Needed));
+                (0..N).filter(|j| *j != law.joint).for_each(|j| signal[j] = None);
+                Some(signal)
+            }
+            TermKind::Joints(_) => {
+                let members: Vec<Signal> =
+                    term.members().iter().filter_map(|member| self.instrument(member, theta)).collect();
+                (!members.is_empty()).then(|| sum(&self.rows, &members))
+            }
+            _ => None,
+        }
+    }
+
+    /// A signal less its mean over each log for joints whose controller has an integral part.
+    fn centred(&self, mut signal: Signal) -> Signal {
         for (j, values) in signal.iter_mut().enumerate() {
             if let Some(values) = values {
                 self.centre(j, values);
@@ -207,8 +230,8 @@ impl<const N: usize, const P: usize> Equation<N, P> {
             },
             TermKind::Payload => self.of_link(N - 1, &of_load(&term.p)),
             TermKind::NominalLink(link) => self.of_link(link, &std::array::from_fn(|i| term.p[i])),
-            TermKind::BaseTilt => self.of_tilt(&term.p, theta),
-            TermKind::Transmission(law) => self.of_transmission(&law, &term.p, theta),
+            TermKind::BaseTilt(axes) => self.of_tilt(axes, &term.p, theta),
+            TermKind::Transmission(law) => self.of_transmission(&law, &term.p, theta, Passed::ByMotor),
             TermKind::Controller(setting) => self.of_controller(setting, term.p[0]),
             TermKind::Row(row) => self.of_row(&row, &term.p),
             TermKind::Table(ref table) => self.of_table(table, &term.p),
@@ -422,13 +445,13 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         }
     }
 
-    /// Torque by joint and row of the weak form, N m or N, due to a tilt of the base by `p`, rad, about two horizontal axes.
-    fn of_tilt(&self, p: &[f64], theta: &[f64; P]) -> Signal {
+    /// Torque by joint and row of the weak form, N m or N, due to a tilt of the base by `p`, rad, about two axes of the base frame.
+    fn of_tilt(&self, axes: [usize; 2], p: &[f64], theta: &[f64; P]) -> Signal {
         let theta = SVector::from(*theta);
         if p[0] == 0.0 && p[1] == 0.0 {
             return vec![None; N];
         }
-        let there = turned(&self.arm, [p[0], p[1]]);
+        let there = turned(&self.arm, axes, [p[0], p[1]]);
         let zero = SVector::zeros();
         let torques: Vec<Vec<SVector<f64, N>>> = self
             .logs

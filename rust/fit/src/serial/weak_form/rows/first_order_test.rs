@@ -30,6 +30,33 @@ impl Regression<'_> {
         is_finite.then(|| Score { size: size.iter().copied().collect(), gain, information, inverse, solved })
     }
 
+    /// Size of a `torque` that is part of the model with the estimate `at`, relative to its size there, by an `instrument`, and the size's standard deviation,
+    /// robust to correlated residuals (instrumental variables, Söderström and Stoica 1989, section 8.2, with the parameters re-estimated). A torque
+    /// that is computed from logged torques contains the disturbances that act on the arm, and explains them; the instrument does not contain them.
+    /// `None` where no parameter is estimated.
+    pub fn instrumented(&self, at: &Estimate, torque: &Signal, instrument: &Signal) -> Option<[f64; 2]> {
+        let fixed = self.fixed();
+        let estimated = |signal: &Signal| {
+            let mut along = self.along(signal);
+            along.iter_mut().zip(&fixed).filter(|(_, fixed)| **fixed).for_each(|(x, _)| *x = 0.0);
+            along
+        };
+        let imitated = self.free.as_ref()?.solve(&estimated(instrument));
+        let shared = self.product(instrument, torque) - imitated.dot(&estimated(torque));
+        let mut blocks = vec![0.0; self.rows.blocks];
+        for (j, rows) in self.rows.joints.iter().enumerate() {
+            let psi = rows.psi.chunks_exact(self.rows.parameters);
+            for ((row, (r, psi)), block) in at.residual[j].iter().zip(psi).enumerate().zip(&rows.block) {
+                let own = instrument[j].as_ref().map_or(0.0, |z| z[row]);
+                let by_parameters: f64 = psi.iter().zip(imitated.iter()).map(|(a, b)| a * b).sum();
+                blocks[*block] += self.weights[j] * r * (own - by_parameters);
+            }
+        }
+        let used = blocks.iter().filter(|b| **b != 0.0).count() as f64;
+        let scatter = blocks.iter().map(|b| b * b).sum::<f64>() * used / (used - 1.0).max(1.0);
+        Some([1.0 + blocks.iter().sum::<f64>() / shared, scatter.sqrt() / shared.abs()])
+    }
+
     /// The estimate `at` with the torques `columns` added at the sizes of their first-order test `score`, and the parameters changed with them, to
     /// first order: its residuals.
     pub fn with_torques(&self, at: &Estimate, columns: &[Signal], score: &Score) -> Vec<Vec<f64>> {
