@@ -28,7 +28,7 @@ _UNEXPLAINED, _OF_ITS_OWN = 4e-4, 4.0
 
 # Largest number of sample intervals of each log, and the shortest interval [s] in it; denser logs are thinned. Parameters of a log's own that have
 # seen little of its motion explain that little too well: with 1.3 s of each log 12 of 70 sets of simulated logs, none of which differ, were said to.
-_MOST_INTERVALS, _SHORTEST_S = 5000, 0.004
+_MOST_INTERVALS, _THINNED_TO_S = 5000, 0.004
 
 
 def logs_differ(logs: Sequence[Log], arm: Arm) -> list[Check]:
@@ -43,7 +43,7 @@ def logs_differ(logs: Sequence[Log], arm: Arm) -> list[Check]:
     arm : Arm
         Nominal model, of kind ``"serial"``.
     """
-    with_torques = [thinned(log, math.floor(_SHORTEST_S / log.sample_period)) for log in logs if log.has_torques]
+    with_torques = [thinned(log, math.floor(_THINNED_TO_S / log.sample_period)) for log in logs if log.has_torques]
     found = rows_of(with_torques, arm, _MOST_INTERVALS)
     alone = [_unexplained(rows, _fitted([rows], arm)) for _, rows in found]
     worst = _worst(found, alone, arm)

@@ -121,10 +121,10 @@ pub fn effect_instances<const N: usize>(
 }
 
 /// Sides of encoder and friction with which a transmission is tried: those with a geared rotor, or all given sides if there are none of this kind or those
-/// with a `riding` rotor are asked for.
-fn tried(sides: &[Sides], riding: bool) -> Vec<&Sides> {
+/// with `rotors_that_ride` are asked for.
+fn tried(sides: &[Sides], rotors_that_ride: bool) -> Vec<&Sides> {
     let geared: Vec<&Sides> = sides.iter().filter(|s| !s.rotor_rides).collect();
-    if riding || geared.is_empty() { sides.iter().collect() } else { geared }
+    if rotors_that_ride || geared.is_empty() { sides.iter().collect() } else { geared }
 }
 
 /// Score tests of all candidates around the fitted hypothesis `base`, with the Jacobian `jacobian` there.

@@ -471,38 +471,4 @@ mod tests {
     fn a_term_below_consequence_is_not_named() {
         assert!(found(&[offset(0, 0.001)], 4).named.is_empty());
     }
-
-    #[test]
-    fn acceptance_needs_every_part_of_the_evidence() {
-        let good = Evidence {
-            parameters: 1.0,
-            price: 12.0,
-            gain: 100.0,
-            relief: 0.0,
-            statistic: 90.0,
-            holdout_gain: 60.0,
-            deviations: 5.0,
-            share: 0.5,
-            consequence: 0.1,
-            instrumented: None,
-        };
-        assert!(good.is_accepted());
-        for weak in [
-            Evidence { statistic: 8.0, ..good },
-            Evidence { statistic: 20.0, deviations: 3.5, ..good },
-            Evidence { gain: 10.0, ..good },
-            Evidence { deviations: 1.0, ..good },
-            Evidence { share: 0.05, ..good },
-            Evidence { consequence: 1e-3, ..good },
-            // A torque that is computed from logged torques, and without the disturbances in them explains nothing.
-            Evidence { instrumented: Some([0.1, 0.05]), ..good },
-            Evidence { instrumented: Some([0.9, 0.3]), ..good },
-        ] {
-            assert!(!weak.is_accepted(), "{weak:?}");
-        }
-        assert!(Evidence { instrumented: Some([0.9, 0.1]), ..good }.is_accepted());
-        let restoring = Evidence { relief: 30.0, statistic: 0.0, deviations: 0.0, share: 0.0, ..good };
-        assert!(restoring.is_accepted());
-        assert!(!Evidence { deviations: -3.0, ..restoring }.is_accepted());
-    }
 }

@@ -20,6 +20,25 @@ pub(in crate::serial) struct Forcing {
     pub inertia: f64,
 }
 
+/// Replaces torques that are not known by a line between their neighbours: a step would be an impulse on the joints that move with the deflection.
+pub(in crate::serial) fn bridge(forcings: &mut [Forcing]) {
+    let known: Vec<usize> = (0..forcings.len()).filter(|k| forcings[*k].torque.is_finite()).collect();
+    let (Some(first), Some(last)) = (known.first(), known.last()) else {
+        forcings.iter_mut().for_each(|forcing| forcing.torque = 0.0);
+        return;
+    };
+    let ends = [forcings[*first].torque, forcings[*last].torque];
+    forcings[..*first].iter_mut().for_each(|forcing| forcing.torque = ends[0]);
+    forcings[*last..].iter_mut().for_each(|forcing| forcing.torque = ends[1]);
+    for pair in known.windows(2) {
+        let [a, b] = [pair[0], pair[1]].map(|k| forcings[k].torque);
+        for k in pair[0] + 1..pair[1] {
+            let part = (k - pair[0]) as f64 / (pair[1] - pair[0]) as f64;
+            forcings[k].torque = a + part * (b - a);
+        }
+    }
+}
+
 /// Mean deflection of an elastic shaft over each sample interval, rad (m), and its mean rate, rad/s (m/s), from its `compliance`, rad/(N m) (m/N), and its
 /// retardation time (damping by stiffness), s. The log begins at rest.
 pub(in crate::serial) fn of_shaft(forcings: &[Forcing], compliance: f64, retardation: f64) -> Vec<[f64; 2]> {
@@ -131,5 +150,18 @@ mod tests {
         assert!((after - mean).abs() < 1e-12, "{after}");
         let stiff = of_shaft(&forcings(20, |_| 5.0, 0.0), 2e-3, 0.0);
         assert_eq!(stiff[19], [0.01, 0.0]);
+    }
+
+    #[test]
+    fn unknown_torques_lie_on_a_line_between_their_neighbours() {
+        let nan = f64::NAN;
+        let bridged = |torques: &[f64]| -> Vec<f64> {
+            let mut all: Vec<Forcing> =
+                torques.iter().map(|torque| Forcing { h: 1e-3, torque: *torque, inertia: 1.0 }).collect();
+            bridge(&mut all);
+            all.iter().map(|forcing| forcing.torque).collect()
+        };
+        assert_eq!(bridged(&[nan, 1.0, nan, nan, 4.0, nan]), [1.0, 1.0, 2.0, 3.0, 4.0, 4.0]);
+        assert_eq!(bridged(&[nan, nan]), [0.0, 0.0]);
     }
 }

@@ -258,7 +258,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         };
         let along = |(log, needs): (&Intervals<N>, &Vec<[SVector<f64, N>; 2]>)| {
             let mut forcings = log.middles.iter().zip(needs).map(at).collect::<Option<Vec<Forcing>>>()?;
-            bridge(&mut forcings);
+            deflection::bridge(&mut forcings);
             Some(forcings)
         };
         self.logs().iter().zip(needs).map(along).collect()
@@ -365,25 +365,6 @@ impl<const N: usize, const P: usize> Equation<N, P> {
     }
 }
 
-/// Replaces torques that are not known by a line between their neighbours: a step would be an impulse on the joints that move with the deflection.
-fn bridge(forcings: &mut [Forcing]) {
-    let known: Vec<usize> = (0..forcings.len()).filter(|k| forcings[*k].torque.is_finite()).collect();
-    let (Some(first), Some(last)) = (known.first(), known.last()) else {
-        forcings.iter_mut().for_each(|forcing| forcing.torque = 0.0);
-        return;
-    };
-    let ends = [forcings[*first].torque, forcings[*last].torque];
-    forcings[..*first].iter_mut().for_each(|forcing| forcing.torque = ends[0]);
-    forcings[*last..].iter_mut().for_each(|forcing| forcing.torque = ends[1]);
-    for pair in known.windows(2) {
-        let [a, b] = [pair[0], pair[1]].map(|k| forcings[k].torque);
-        for k in pair[0] + 1..pair[1] {
-            let part = (k - pair[0]) as f64 / (pair[1] - pair[0]) as f64;
-            forcings[k].torque = a + part * (b - a);
-        }
-    }
-}
-
 /// Torques that the links need on all joints, and the diagonal of their inertia matrix, by log and sample interval.
 type LinkNeeds<const N: usize> = Vec<Vec<[SVector<f64, N>; 2]>>;
 
@@ -452,19 +433,6 @@ mod tests {
             (residual.iter().map(|r| r * r).sum::<f64>() / residual.len() as f64).sqrt()
         };
         [rms(&vec![None]), rms(&equation.of_transmission(&law, p, &theta, Passed::ByMotor))]
-    }
-
-    #[test]
-    fn unknown_torques_lie_on_a_line_between_their_neighbours() {
-        let nan = f64::NAN;
-        let bridged = |torques: &[f64]| -> Vec<f64> {
-            let mut all: Vec<Forcing> =
-                torques.iter().map(|torque| Forcing { h: 1e-3, torque: *torque, inertia: 1.0 }).collect();
-            bridge(&mut all);
-            all.iter().map(|forcing| forcing.torque).collect()
-        };
-        assert_eq!(bridged(&[nan, 1.0, nan, nan, 4.0, nan]), [1.0, 1.0, 2.0, 3.0, 4.0, 4.0]);
-        assert_eq!(bridged(&[nan, nan]), [0.0, 0.0]);
     }
 
     #[test]
