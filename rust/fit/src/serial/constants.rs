@@ -27,6 +27,13 @@ pub const INSTRUMENTED_DEVIATIONS: f64 = 3.5;
 /// 3.9 on a joint next to an elastic one.
 pub const INSTRUMENTED_DIFFERENCE: f64 = 0.5;
 
+/// Number of stretches of two seconds, counted by their shares of the decrease of the cost by a law, up to which the law acts once.
+pub const AN_EVENT: f64 = 1.5;
+
+/// Part of the cost of the one event in which a law acts that the law has to remove: 0.84 for a controller's answer to a push that passes for a saturation,
+/// 0.9999 for a saturation that is reached once.
+pub const WHOLE_EVENT: f64 = 0.9;
+
 /// Smallest share, 0 to 1, of the squared holdout residuals of at least one joint that a term of the model has to remove to be accepted.
 pub const MATTERS: f64 = 0.1;
 

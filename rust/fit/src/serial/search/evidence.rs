@@ -2,8 +2,8 @@
 
 use crate::numeric::random::Random;
 use crate::serial::constants::{
-    CONSEQUENCE, HOLDOUT_DEVIATIONS, INSTRUMENTED_DEVIATIONS, INSTRUMENTED_DIFFERENCE, MATTERS, NOTICED,
-    PRICE, RESAMPLES, RESTORES, RESTORES_EACH, SIGNIFICANT,
+    AN_EVENT, CONSEQUENCE, HOLDOUT_DEVIATIONS, INSTRUMENTED_DEVIATIONS, INSTRUMENTED_DIFFERENCE, MATTERS,
+    NOTICED, PRICE, RESAMPLES, RESTORES, RESTORES_EACH, SIGNIFICANT, WHOLE_EVENT,
 };
 use crate::serial::search::Search;
 use crate::serial::search::fitting::Fitted;
@@ -40,6 +40,9 @@ pub struct Evidence {
     /// Size of the term on the training logs by its instrument ([`Motion::instrument`]), relative to the fitted size, and the standard deviation; `None` for
     /// terms without an instrument.
     pub instrumented: Option<[f64; 2]>,
+    /// Number of stretches of two seconds that the decrease of the cost by a law comes from, counted by their shares of it, and the part of the cost of the
+    /// first of them that the law removes ([`stretches`]); `None` for other terms.
+    pub stretches: Option<[f64; 2]>,
 }
 
 impl Evidence {
@@ -64,7 +67,12 @@ impl Evidence {
 
     /// Whether the term is accepted, for what it explains or for the arm file's values that it restores.
     pub fn is_accepted(&self) -> bool {
-        self.is_exogenous() && (self.explains() || self.restores())
+        self.is_exogenous() && self.recurs() && (self.explains() || self.restores())
+    }
+
+    /// Whether a law acts more than once, or explains all of the one event in which it acts.
+    fn recurs(&self) -> bool {
+        self.stretches.is_none_or(|[stretches, removed]| stretches > AN_EVENT || removed > WHOLE_EVENT)
     }
 
     /// Whether the term explains more than the disturbances that its own torque contains.
@@ -83,7 +91,8 @@ impl Search<'_> {
     /// the effect has the size that the training logs gave it, a slope of zero that it is absent. The joints that the term acts on count, as the
     /// scatter of the other joints' parameters says nothing about the term; or all joints, where these say more: a wrong torque gain of an outer joint
     /// shows on an inner one, whose torque holds the same links. The slope's standard deviation comes from the scatter of the blocks'
-    /// scores. How unevenly an effect is spread over the blocks does not count against the effect: a joint limit may be reached only twice in a log.
+    /// scores. How unevenly an effect is spread over the blocks does not count against the effect, unless it acts once: a joint limit may be reached only twice
+    /// in a log.
     pub(in crate::serial) fn evidence(
         &self,
         regression: &Regression,
@@ -131,6 +140,18 @@ impl Search<'_> {
                 .training
                 .instrument(term, &with.estimate.theta)
                 .and_then(|instrument| regression.instrumented(&with.estimate, &signal, &instrument)),
+            stretches: matches!(term.kind, TermKind::Law(_)).then(|| {
+                let cost = |fit: &Fitted, set: usize, block: usize| -> f64 {
+                    acts_on.iter().filter_map(|j| fit.costs[set][*j].get(block)).sum()
+                };
+                let blocks = [self.training.rows().blocks, self.holdout.rows().blocks];
+                let of = |set: usize| (0..blocks[set]).map(move |block| (set, block));
+                let costs: Vec<[f64; 2]> = of(0)
+                    .chain(of(1))
+                    .map(|(set, block)| [cost(without, set, block), cost(with, set, block)])
+                    .collect();
+                stretches(&costs)
+            }),
         }
     }
 
@@ -146,6 +167,28 @@ impl Search<'_> {
         let of = |(j, n): (usize, &f64)| n * (cost(without, j) / cost(with, j)).ln();
         independent.iter().enumerate().map(of).filter(|x| !x.is_nan()).sum()
     }
+}
+
+/// Number of stretches of two blocks that the decrease of a cost comes from: one over the sum of the squared shares of the stretches in it; and the part of the
+/// cost of the stretch with the largest share that is removed. `costs` are those of each block, before and after. An event that two blocks share is
+/// one stretch; blocks in which the cost rises have no share.
+fn stretches(costs: &[[f64; 2]]) -> [f64; 2] {
+    let from = |first: usize| {
+        let pairs = costs[..first].chunks(2).chain(costs[first..].chunks(2));
+        let (mut sum, mut squares, mut largest) = (0.0, 0.0, [0.0, 1.0]);
+        for pair in pairs {
+            let gain: f64 = pair.iter().map(|[before, after]| (before - after).max(0.0)).sum();
+            sum += gain;
+            squares += gain * gain;
+            if gain > largest[0] {
+                largest = [gain, pair.iter().map(|[before, _]| before).sum()];
+            }
+        }
+        let count = if squares > 0.0 { sum * sum / squares } else { f64::INFINITY };
+        [count, largest[0] / largest[1]]
+    };
+    let [one, other] = [from(0), from(costs.len().min(1))];
+    if one[0] <= other[0] { one } else { other }
 }
 
 /// Twice the logarithm of a likelihood ratio, by the decrease `gain` of a cost (weighted squared residuals) that is `before`, where the weights were
@@ -344,6 +387,7 @@ mod tests {
             share: 0.5,
             consequence: 0.1,
             instrumented: None,
+            stretches: None,
         };
         assert!(good.is_accepted());
         for weak in [
@@ -356,12 +400,24 @@ mod tests {
             // A torque that is computed from logged torques, and without the disturbances in them explains nothing.
             Evidence { instrumented: Some([0.1, 0.05]), ..good },
             Evidence { instrumented: Some([0.9, 0.3]), ..good },
+            Evidence { stretches: Some([1.2, 0.6]), ..good },
         ] {
             assert!(!weak.is_accepted(), "{weak:?}");
         }
         assert!(Evidence { instrumented: Some([0.9, 0.1]), ..good }.is_accepted());
+        assert!(Evidence { stretches: Some([1.2, 0.99]), ..good }.is_accepted());
         let restoring = Evidence { relief: 30.0, statistic: 0.0, deviations: 0.0, share: 0.0, ..good };
         assert!(restoring.is_accepted());
         assert!(!Evidence { deviations: -3.0, ..restoring }.is_accepted());
+    }
+
+    #[test]
+    fn an_event_that_two_blocks_share_is_one_stretch() {
+        let of = |gains: &[f64]| stretches(&gains.iter().map(|gain| [10.0, 10.0 - gain]).collect::<Vec<_>>());
+        assert_eq!(of(&[0.0, 0.0, 5.0, 5.0, -1.0, 0.0]), [1.0, 0.5]);
+        assert_eq!(of(&[0.0, 9.0, 9.0, 0.0]), [1.0, 0.9]);
+        assert_eq!(of(&[5.0, 0.0, 0.0, 0.0, 5.0, 0.0])[0], 2.0);
+        assert_eq!(of(&[1.0; 20])[0], 10.0);
+        assert!(of(&[-1.0; 4])[0].is_infinite() && of(&[])[0].is_infinite());
     }
 }
