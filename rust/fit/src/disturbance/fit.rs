@@ -107,13 +107,15 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     ///
     /// The share counts from the cost of the model without the push, or of the model refitted to the recording alone if that is less. Where the model
     /// leaves errors unexplained and the output error explains too little to be believed, or leaves the impulse unknown, `rough` is returned unchanged if
-    /// the push lowers the cost under the model or under the refitted one. `known` are the recording's further pushes.
+    /// the push lowers the cost under the model or under the refitted one. `known` are the recording's further pushes, and `meanwhile` first estimates of
+    /// those that act on other joints at the same time, beside which the push is fitted; its share counts from the cost without them.
     pub(super) fn sized(
         &self,
         rough: Disturbance,
         state: &PushState<'_, N, P>,
         own: &Own<'_, A, N, P>,
         known: &[Disturbance],
+        meanwhile: &[Disturbance],
     ) -> Option<Disturbance> {
         let whole = if rough.holdout { &self.holdout } else { &self.training };
         let sample = WindowSet { data: whole.data.without_pushes(), measured: whole.measured.clone() };
@@ -126,16 +128,25 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             * data.windows.len() as f64;
         let (weighting, _) = self.at_measured_starts(&data, state);
         let sample = WindowSet::new(data);
+        let in_this_log = |e: &&Disturbance| e.place() == rough.place();
+        let before: Vec<EffectInstance> = known.iter().filter(in_this_log).map(|e| e.push).collect();
         let here: Vec<EffectInstance> =
-            known.iter().filter(|e| e.place() == rough.place()).map(|e| e.push).collect();
-        let mut touched =
-            Touched { arm: &self.arm, model: state.model, sample, weighting, known: &here, push: rough.push };
+            before.iter().copied().chain(meanwhile.iter().map(|e| e.push)).collect();
+        let mut touched = Touched {
+            arm: &self.arm,
+            model: state.model,
+            sample,
+            weighting,
+            known: &before,
+            push: rough.push,
+        };
         let p = Vector3::from(rough.push.p);
         let none = Vector3::new(0.0, p[1], p[2]);
         let mut bare = touched.cost(&touched.residual_of(&none));
         if !state.remainder {
             bare = touched.cost_under(self, own.bare(), &none).min(bare);
         }
+        touched.known = &here;
         let seen = touched.cost(&touched.residual_of(&p));
         // Where the model leaves errors unexplained, a search from other durations would fit these errors instead of the push.
         let (law, mut fitted, left) = touched

@@ -52,7 +52,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let state = &PushState { min_relevance: state.faintest, ..*state };
         while disturbances.len() < MAX_PUSHES {
             let rough = self.in_worst_window(place, state, disturbances);
-            let sized = rough.and_then(|rough| self.sized(rough, state, own, disturbances));
+            let sized = rough.and_then(|rough| self.sized(rough, state, own, disturbances, &[]));
             let Some(disturbance) = sized.filter(|e| {
                 e.share > OUTLYING_EXPLAINED_SHARE && e.push.p[0].abs() > OUTLYING_IMPULSE * e.sigma[0]
             }) else {

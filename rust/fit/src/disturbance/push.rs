@@ -222,11 +222,20 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         };
         let rough = [of(&found.bells, false), of(&found.light, true)].concat();
         let mut disturbances: Vec<Disturbance> = Vec::new();
+        let mut together = Vec::new();
         for (i, one) in rough.iter().enumerate() {
             // A push on the last link acts on all joints: beside what it does on the others the one on this joint explains the motion.
-            let meanwhile = rough[i + 1..].iter().filter(|other| one.is_with(other));
-            let beside: Vec<Disturbance> = disturbances.iter().chain(meanwhile).cloned().collect();
-            disturbances.extend(self.sized(one.clone(), state, own, &beside));
+            let meanwhile: Vec<Disturbance> =
+                rough[i + 1..].iter().filter(|other| one.is_with(other)).cloned().collect();
+            let sized = self.sized(one.clone(), state, own, &disturbances, &meanwhile);
+            together.extend(sized.iter().map(|_| !meanwhile.is_empty()));
+            disturbances.extend(sized);
+        }
+        for i in (0..disturbances.len()).rev().filter(|i| together[*i]) {
+            let one = disturbances.remove(i);
+            if let Some(sized) = self.sized(one, state, own, &disturbances, &[]) {
+                disturbances.insert(i, sized);
+            }
         }
         let all = [found.bells, found.light].concat();
         disturbances.retain(|e| e.is_known() && !self.meets_an_end(e, &all));
