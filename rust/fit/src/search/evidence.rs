@@ -15,12 +15,12 @@ use crate::search::attribute::SearchNode;
 use crate::search::belief::{Cause, belief_beside, left_over};
 use crate::search::model_search::Attribution;
 use crate::search::rivals::rival_law::LawBeside;
+use crate::search::size_certainty::size_certainty;
 use armgap_core::arm::Arm;
-use armgap_core::effect::{MAX_PARAMETERS, Scope, Trial, catalogue};
+use armgap_core::effect::{Scope, Trial, catalogue};
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
-use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// Standard deviation of the ratio of an effect's sizes fitted to two logs, for an effect that is in the arm: made by other unmodelled effects, in
 /// addition to the fits' own standard deviation.
@@ -42,11 +42,6 @@ const GAIN_POWER: f64 = 0.5;
 /// Exponent, in the odds of a cause, of the ratio of the gap left by an unnamed law (a table over one variable in place of the cause) to the gap left
 /// by the cause; fitted as `PRIOR_ODDS` is. At 1 the log loss is larger by a fifth, at 3 by a hundredth.
 const RIVAL_POWER: i32 = 4;
-
-/// Number of effects that are not in the arm of which the one with the largest size, in standard deviations, may be taken for a cause: fewer than the
-/// candidates, as their sizes are correlated. Of 100 causes on arms of another simulator seven wrong ones at 0.5 and above have sizes of 1.4 to 2.9
-/// standard deviations and fall below 0.5, and one right one with them; with 10 one of the seven stays, with 40 two more right ones fall.
-const BY_CHANCE: f64 = 20.0;
 
 /// Evidence for a cause in the final model.
 #[derive(Debug, Clone, Copy, Default, JsonSchema, Serialize)]
@@ -321,28 +316,6 @@ fn size_ratio<const P: usize>(place: usize, of: &Fit<P>, other: &Fit<P>) -> Opti
     (ratio.is_finite() && sigma.is_finite()).then_some((ratio, sigma))
 }
 
-/// Probability that none of [`BY_CHANCE`] effects that are not in the arm has a size as many standard deviations from none as the effect with index `place`
-/// in a fit: as its amplitudes, or as the compliance or width of a transmission. None for other effects, and where no standard deviation is known.
-fn size_certainty<const P: usize>(place: usize, fit: &Fit<P>) -> Option<f64> {
-    let effects = &fit.hypothesis.effects;
-    let effect = &effects[place];
-    let first = P + effects[..place].iter().map(EffectInstance::len).sum::<usize>();
-    let off = neutral(effect);
-    let (sizes, none) = match effect.law.spec().trial {
-        Trial::Whole if effect.law.has_transmission() => (1, [0.0; MAX_PARAMETERS]),
-        Trial::Whole | Trial::Disturbance => return None,
-        _ => (effect.amplitudes(), off.p),
-    };
-    let by_chance = |i: usize| {
-        let deviations = (effect.p[i] - none[i]).abs() / fit.sigma(first + i);
-        let degrees = fit.covariance.degrees_of_freedom[first + i];
-        let known = StudentsT::new(0.0, 1.0, degrees).ok()?;
-        deviations.is_finite().then(|| 2.0 * known.sf(deviations))
-    };
-    let least = (0..sizes).filter_map(by_chance).reduce(f64::min)?;
-    Some((1.0 - least).powf(BY_CHANCE * sizes as f64))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -484,5 +457,12 @@ mod tests {
         let unknown = Evidence { size_ratio_sigma: Some(2.0), ..known };
         let silent = evidence(1.0, None).probability();
         assert!((unknown.probability() - silent).abs() < 0.1 && known.probability() < 0.5 * silent);
+    }
+
+    #[test]
+    fn a_size_that_is_not_told_from_none_is_hardly_evidence() {
+        let sure = evidence(5.0, Some(1.0));
+        let unsure = Evidence { size_certainty: Some(0.2), ..sure };
+        assert!((unsure.probability() - 0.2 * sure.probability()).abs() < 1e-12);
     }
 }

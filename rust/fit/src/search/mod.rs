@@ -10,6 +10,7 @@
 //! * `pairs`: two effects accepted at once, where neither of them is the best one alone.
 //! * `reconsider`: replacement of a cause by a rival candidate that explains the windows better once the other causes are known.
 //! * `rivals`: close candidates compared in pairs, equivalent effects, and a table over one variable of the motion as the rival of a named cause.
+//! * `size_certainty`: whether the size of a cause is told from none, beside those of effects that are not in the arm.
 
 pub mod acceptance;
 pub mod attribute;
@@ -21,3 +22,4 @@ pub mod model_search;
 pub(crate) mod pairs;
 pub(crate) mod reconsider;
 pub mod rivals;
+mod size_certainty;

@@ -1,8 +1,8 @@
 //! Joint elasticity and backlash in the weak form: how a deflection between motor and link changes the equation of motion.
 //!
-//! The deflection between motor and link follows from the torque that the body without an encoder would need to move with the other
-//! ([`super::deflection`]). Where the encoder measures the motor, the link's position is the motor's less the deflection; where the encoder measures
-//! the link, the motor's position, at which rotor inertia and friction act, is the link's plus the deflection.
+//! The deflection between motor and link follows from the torque that a shaft passes on, or in a backlash from the torque that the body without an encoder
+//! would need to move with the other ([`super::deflection`]). Where the encoder measures the motor, the link's position is the motor's less the
+//! deflection; where the encoder measures the link, the motor's position, at which rotor inertia and friction act, is the link's plus the deflection.
 
 use crate::model::hypothesis::EffectInstance;
 use crate::numeric::cache::Cache;
