@@ -23,13 +23,19 @@ pub(in crate::serial) struct Forcing {
 /// Replaces torques that are not known by a line between their neighbours: a step would be an impulse on the joints that move with the deflection.
 pub(in crate::serial) fn bridge(forcings: &mut [Forcing]) {
     let known: Vec<usize> = (0..forcings.len()).filter(|k| forcings[*k].torque.is_finite()).collect();
-    let (Some(first), Some(last)) = (known.first(), known.last()) else {
-        forcings.iter_mut().for_each(|forcing| forcing.torque = 0.0);
+    let (Some(&first), Some(&last)) = (known.first(), known.last()) else {
+        for forcing in forcings {
+            forcing.torque = 0.0;
+        }
         return;
     };
-    let ends = [forcings[*first].torque, forcings[*last].torque];
-    forcings[..*first].iter_mut().for_each(|forcing| forcing.torque = ends[0]);
-    forcings[*last..].iter_mut().for_each(|forcing| forcing.torque = ends[1]);
+    let ends = [forcings[first].torque, forcings[last].torque];
+    for forcing in &mut forcings[..first] {
+        forcing.torque = ends[0];
+    }
+    for forcing in &mut forcings[last..] {
+        forcing.torque = ends[1];
+    }
     for pair in known.windows(2) {
         let [a, b] = [pair[0], pair[1]].map(|k| forcings[k].torque);
         for k in pair[0] + 1..pair[1] {
