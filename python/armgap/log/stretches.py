@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armgap.log.findings import Finding
-from armgap.log.log import Log
+from armgap.log.log import SIGNALS, Log
 
 __all__ = ["BUDGET", "SHORTEST_S", "STRETCH", "STRETCH_S", "choose", "thinned"]
 
@@ -109,8 +109,8 @@ def thinned(log: Log, every: int) -> Log:
     moment = (h * tau * off_centre).sum(axis=1)
     if log.moment is not None:
         moment = moment + log.moment[: kept * every].reshape(kept, every, -1).sum(axis=1)
-    columns = ("q", "dq", "tau_meas", "q_link")
-    arrays: dict[str, Any] = {key: None if (x := getattr(log, key)) is None else x[at] for key in columns}
+    sampled = (key for key in SIGNALS if key not in ("tau", "moment"))
+    arrays: dict[str, Any] = {key: None if (x := getattr(log, key)) is None else x[at] for key in sampled}
     said = Finding("stretches", f"one in {every} samples is used, with the mean of the torques in between")
     return replace(log, t=log.t[at], tau=mean, moment=moment, findings=(*log.findings, said), **arrays)
 
