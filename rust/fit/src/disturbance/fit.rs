@@ -1,29 +1,35 @@
 //! Output-error fit of a push (external disturbance): impulse, time and duration that minimise the prediction errors of the windows that the push
 //! touches.
 
-use super::outlying::outlying_probability;
+use super::outlying::{OUTLYING, outlying_probability};
 use super::own::Own;
-use super::push::{Disturbance, Place, PushState, SHORTEST};
+use super::push::{Disturbance, Place, PushState};
+use super::search::MAX_PUSHES;
+use super::touched::Touched;
 use crate::likelihood::context::{DiagnosisContext, WindowSet};
-use crate::likelihood::solve::scaled_inverse;
 use crate::likelihood::weighting::Weighting;
+use crate::log::track::Track;
 use crate::model::hypothesis::{EffectInstance, Hypothesis};
-use crate::predict::window::Dataset;
+use crate::predict::window::{Dataset, Window};
 use armgap_core::arm::Arm;
-use armgap_core::effect::{Effect, PulseShape};
 use armgap_core::transmission::LatentState;
-use nalgebra::{DMatrix, DVector, Vector3};
 
 /// Largest distance in time, s, from a push's Gaussian pulse to a window that takes part in the fit of the push.
 const MAX_WINDOW_DISTANCE: f64 = 0.25;
+
+/// Time from a push's centre up to which it acts, in durations.
+const ACTS: f64 = 0.75;
+
+/// Ratio of the costs with and without a further push up to which it belongs to the pushes near it.
+const SHRINKS: f64 = 0.5;
+
+/// Number of times that each of several pushes near each other is fitted beside the others.
+const TOGETHER_ROUNDS: usize = 2;
 
 /// Impulse up to which a push on an arm whose model has backlash is none, relative to the largest impulse that rotor and link exchange through the
 /// backlash in the log: a wrong instant or strength of an impact leaves such an impulse. Pushes that nobody gave had 0.02 to 0.12, those that were given
 /// 0.24 and more (docs/decisions/025-knocks.md).
 const OF_AN_IMPACT: f64 = 0.2;
-
-/// Longest duration of a fitted push, s.
-const LONGEST: f64 = 2.5;
 
 /// Least share of the cost of the windows that a push touches which the push must remove to be kept where the model leaves errors unexplained.
 const HELPS: f64 = 0.05;
@@ -44,33 +50,8 @@ const MOVED_LEAST: f64 = 0.1;
 /// Largest factor by which the output-error fit may change the impulse of a push where the model leaves errors unexplained.
 const CHANGED: f64 = 1.5;
 
-/// Largest number of Levenberg-Marquardt steps in the fit of a push.
-const MAX_PUSH_ITERATIONS: usize = 12;
-
-/// Largest number of attempts at each step in the fit of a push, each with more damping.
-const ATTEMPTS: usize = 6;
-
-/// Relative decrease of the cost below which the fit of a push ends.
-const PUSH_COST_TOLERANCE: f64 = 1e-4;
-
-/// Durations, s, from which the fit of a push is started besides the duration seen in the residual torque.
-const LONGER: [f64; 2] = [0.04, 0.12];
-
 /// Number of rounds in which initial states and weights of the windows are recomputed with a fitted push in the model.
 const PUSH_ROUNDS: usize = 2;
-
-/// Displacement of the model's values along a principal axis of their covariance, for sensitivities by finite difference, in standard deviations.
-const AXIS_STEP: f64 = 0.01;
-
-/// Windows that a push touches, with the residual of their predictions under any values of the push.
-struct Touched<'a, A, const N: usize, const P: usize> {
-    arm: &'a A,
-    model: &'a Hypothesis<P>,
-    sample: WindowSet<N>,
-    weighting: Weighting<N>,
-    known: &'a [EffectInstance],
-    push: EffectInstance,
-}
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
     /// Whether the prediction errors of a log leave room for a push that matters; always true where the model leaves errors unexplained.
@@ -102,76 +83,170 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         (weighting.with_zeros(state.zeros.clone()), predicted)
     }
 
-    /// The push `rough` with the impulse, time and duration fitted by output error, and the share of the cost that the push explains; `None` if the
-    /// share is too small.
+    /// The pushes `seen` in one log, which are near each other in time, with impulses, times and durations fitted by output error, each beside the others
+    /// and the pushes `before`; those that explain too little beside the others are left out.
+    pub(super) fn sized_together(
+        &self,
+        seen: Vec<Disturbance>,
+        state: &PushState<'_, N, P>,
+        own: &Own<'_, A, N, P>,
+        before: &[Disturbance],
+    ) -> Vec<Disturbance> {
+        let mut open = self.complete(seen, state, before);
+        let rounds = if open.len() > 1 { TOGETHER_ROUNDS } else { 1 };
+        for _ in 0..rounds {
+            self.size_each(&mut open, state, own, before);
+        }
+        while let Some(part) = part_of_another(&open) {
+            open.remove(part);
+            self.size_each(&mut open, state, own, before);
+        }
+        open.into_iter().map(|(_, sized)| sized).collect()
+    }
+
+    /// Fits every push of `open`, as seen and as fitted so far, beside the others and the pushes `before`; those that explain too little are taken out.
+    fn size_each(
+        &self,
+        open: &mut Vec<(Disturbance, Disturbance)>,
+        state: &PushState<'_, N, P>,
+        own: &Own<'_, A, N, P>,
+        before: &[Disturbance],
+    ) {
+        let mut i = 0;
+        while i < open.len() {
+            let (seen, first) = open.remove(i);
+            let others: Vec<Disturbance> =
+                before.iter().chain(open.iter().map(|(_, fitted)| fitted)).cloned().collect();
+            if let Some(sized) = self.sized(&seen, first.push, state, own, &others) {
+                open.insert(i, (seen, sized));
+                i += 1;
+            }
+        }
+    }
+
+    /// The pushes `seen` and what they are when fitted together; where the model describes the arm and they leave errors far above the usual ones, with
+    /// further pushes in the window of the largest error, as long as these shrink the cost: one push that is not known spoils the fit of those beside it.
+    fn complete(
+        &self,
+        seen: Vec<Disturbance>,
+        state: &PushState<'_, N, P>,
+        before: &[Disturbance],
+    ) -> Vec<(Disturbance, Disturbance)> {
+        let place = seen[0].place();
+        let mut seen = seen;
+        let (mut fitted, mut left) = self.fitted_together(&seen, state, before);
+        while !state.remainder && left > OUTLYING && before.len() + seen.len() < MAX_PUSHES {
+            let known: Vec<Disturbance> = before.iter().chain(&fitted).cloned().collect();
+            let Some(further) = self.in_worst_window(place, state, &known) else { break };
+            if !fitted.iter().any(|push| push.is_near(&further, self.horizon)) {
+                break;
+            }
+            let with: Vec<Disturbance> = fitted.iter().cloned().chain([further.clone()]).collect();
+            let (together, lower) = self.fitted_together(&with, state, before);
+            let (added, others) = together.split_last().expect("the further push is among them");
+            if lower > SHRINKS * left || others.iter().any(|push| push.overlaps(added)) {
+                break;
+            }
+            seen.push(further);
+            (fitted, left) = (together, lower);
+        }
+        seen.into_iter().zip(fitted).collect()
+    }
+
+    /// The pushes `first` of one log fitted together to the windows that they touch, beside the pushes `before`, and the cost of these windows in units of
+    /// their usual cost.
+    fn fitted_together(
+        &self,
+        first: &[Disturbance],
+        state: &PushState<'_, N, P>,
+        before: &[Disturbance],
+    ) -> (Vec<Disturbance>, f64) {
+        let place = first[0].place();
+        let whole = [&self.training, &self.holdout][place.0];
+        let sample = WindowSet { data: whole.data.without_pushes(), measured: whole.measured.clone() };
+        let track = &sample.data.tracks[place.1];
+        let data = sample.data.of_track(place.1, |w| first.iter().any(|e| e.reaches(track, w)));
+        if data.windows.is_empty() {
+            return (first.to_vec(), 0.0);
+        }
+        let usual = self.weighting(&sample, state.model, state.scale, state.zeros).typical
+            * data.windows.len() as f64;
+        let pushes: Vec<EffectInstance> = first.iter().map(|e| e.push).collect();
+        let touched = self.touched_windows(data, place, state, before);
+        let (fitted, left) = touched.of_all_shapes(&pushes, Touched::minimise);
+        let fitted = first.iter().zip(fitted).map(|(e, push)| Disturbance { push, ..e.clone() });
+        (fitted.collect(), left / usual.max(1e-300))
+    }
+
+    /// The windows `data` of the log at `place`, with the pushes `known` of this log.
+    fn touched_windows<'a>(
+        &'a self,
+        data: Dataset<N>,
+        place: Place,
+        state: &PushState<'a, N, P>,
+        known: &[Disturbance],
+    ) -> Touched<'a, A, N, P> {
+        let (weighting, _) = self.at_measured_starts(&data, state);
+        let known = known.iter().filter(|e| e.place() == place).map(|e| e.push).collect();
+        Touched { arm: &self.arm, model: state.model, sample: WindowSet::new(data), weighting, known }
+    }
+
+    /// The push `seen` with the impulse, time and duration fitted by output error from the first guess `first`, and the share of the cost that the push
+    /// explains; `None` if the share is too small.
     ///
     /// The share counts from the cost of the model without the push, or of the model refitted to the recording alone if that is less. Where the model
-    /// leaves errors unexplained and the output error explains too little to be believed, or leaves the impulse unknown, `rough` is returned unchanged if
-    /// the push lowers the cost under the model or under the refitted one. `known` are the recording's further pushes, and `meanwhile` first estimates of
-    /// those that act on other joints at the same time, beside which the push is fitted; its share counts from the cost without them.
+    /// leaves errors unexplained and the output error explains too little to be believed, or leaves the impulse unknown, `seen` is returned unchanged if
+    /// the push lowers the cost under the model or under the refitted one. `known` are the recording's further pushes.
     pub(super) fn sized(
         &self,
-        rough: Disturbance,
+        seen: &Disturbance,
+        first: EffectInstance,
         state: &PushState<'_, N, P>,
         own: &Own<'_, A, N, P>,
         known: &[Disturbance],
-        meanwhile: &[Disturbance],
     ) -> Option<Disturbance> {
-        let whole = if rough.holdout { &self.holdout } else { &self.training };
+        let whole = if seen.holdout { &self.holdout } else { &self.training };
         let sample = WindowSet { data: whole.data.without_pushes(), measured: whole.measured.clone() };
-        let data = around(&sample, &rough);
+        let data = around(&sample, seen);
         if data.windows.is_empty() {
-            return state.remainder.then_some(rough);
+            return state.remainder.then_some(seen.clone());
         }
         let least = least_gain(&sample, state);
         let usual = self.weighting(&sample, state.model, state.scale, state.zeros).typical
             * data.windows.len() as f64;
-        let (weighting, _) = self.at_measured_starts(&data, state);
-        let sample = WindowSet::new(data);
-        let in_this_log = |e: &&Disturbance| e.place() == rough.place();
-        let before: Vec<EffectInstance> = known.iter().filter(in_this_log).map(|e| e.push).collect();
-        let here: Vec<EffectInstance> =
-            before.iter().copied().chain(meanwhile.iter().map(|e| e.push)).collect();
-        let mut touched = Touched {
-            arm: &self.arm,
-            model: state.model,
-            sample,
-            weighting,
-            known: &before,
-            push: rough.push,
-        };
-        let p = Vector3::from(rough.push.p);
-        let none = Vector3::new(0.0, p[1], p[2]);
-        let mut bare = touched.cost(&touched.residual_of(&none));
+        let mut touched = self.touched_windows(data, seen.place(), state, known);
+        let mut bare = touched.cost_of(&[]);
         if !state.remainder {
-            bare = touched.cost_under(self, own.bare(), &none).min(bare);
+            bare = touched.cost_under(self, own.bare(), &[]).min(bare);
         }
-        touched.known = &here;
-        let seen = touched.cost(&touched.residual_of(&p));
         // Where the model leaves errors unexplained, a search from other durations would fit these errors instead of the push.
-        let (law, mut fitted, left) = touched
-            .of_all_shapes(|touched| if state.remainder { touched.minimise(p) } else { touched.least(p) });
+        let (fitted, left) = touched.of_all_shapes(&[first], |touched, first| {
+            if state.remainder {
+                return touched.minimise(first);
+            }
+            let (fitted, left) = touched.least(first[0]);
+            (vec![fitted], left)
+        });
+        let mut fitted = fitted[0];
         let share = |left: f64| (bare - left) / (bare - usual.min(0.5 * bare)).max(1e-300);
         let believed = share(left) > PUSH_EXPLAINED_SHARE && bare - left > least;
-        if believed && close(&fitted, &p, state.remainder) {
-            touched.push.law = law;
+        if believed && close(&fitted.p, &seen.push.p, state.remainder) {
             for _ in 0..PUSH_ROUNDS {
-                touched.sample.data.tracks[0].pushes = touched.with(&fitted);
+                touched.sample.data.tracks[0].pushes = touched.with(&[fitted]);
                 touched.weighting = self.weighting(&touched.sample, state.model, state.scale, state.zeros);
-                (fitted, _) = touched.minimise(fitted);
+                fitted = touched.minimise(vec![fitted]).0[0];
             }
-            let push = EffectInstance { p: fitted.into(), ..touched.push };
             let share = share(left);
-            let largest = self.impact_impulse(rough.place(), state.model);
-            let sigma = if fitted[0].abs() < OF_AN_IMPACT * largest {
+            let largest = self.impact_impulse(seen.place(), state.model);
+            let sigma = if fitted.p[0].abs() < OF_AN_IMPACT * largest {
                 None
             } else {
                 touched.sigma(&fitted, state.covariance)
             };
-            let sized = sigma.map(|sigma| Disturbance { push, sigma, share, ..rough });
+            let sized = sigma.map(|sigma| Disturbance { push: fitted, sigma, share, ..*seen });
             if !state.remainder {
                 // Windows far above the typical one show a push that is lost in the scatter of the residual torque.
-                let probability = rough.probability.max(outlying_probability(bare, usual));
+                let probability = seen.probability.max(outlying_probability(bare, usual));
                 return sized.map(|sized| Disturbance { probability, ..sized });
             }
             if sized.as_ref().is_some_and(Disturbance::is_known) {
@@ -181,27 +256,30 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         if !state.remainder {
             return None;
         }
-        touched.push.law = rough.push.law;
-        if share(seen) > HELPS {
-            return Some(Disturbance { share: share(seen), ..rough });
+        let as_seen = share(touched.cost_of(&[seen.push]));
+        if as_seen > HELPS {
+            return Some(Disturbance { share: as_seen, ..seen.clone() });
         }
         let others: Vec<&Disturbance> = known.iter().collect();
-        let with: Vec<&Disturbance> = known.iter().chain([&rough]).collect();
-        let without = touched.cost_under(self, &own.beside(&others), &none);
-        let share = 1.0 - touched.cost_under(self, &own.beside(&with), &p) / without;
-        (share > HELPS_OWN).then_some(Disturbance { share, ..rough })
+        let with: Vec<&Disturbance> = known.iter().chain([seen]).collect();
+        let without = touched.cost_under(self, &own.beside(&others), &[]);
+        let share = 1.0 - touched.cost_under(self, &own.beside(&with), &[seen.push]) / without;
+        (share > HELPS_OWN).then_some(Disturbance { share, ..seen.clone() })
     }
+}
+
+/// Index of a fitted push that overlaps another of a larger impulse; none if no two overlap.
+fn part_of_another(open: &[(Disturbance, Disturbance)]) -> Option<usize> {
+    let impulse = |i: usize| open[i].1.push.p[0].abs();
+    let is_part = |i: &usize| {
+        (0..open.len()).any(|k| k != *i && open[k].1.overlaps(&open[*i].1) && impulse(k) >= impulse(*i))
+    };
+    (0..open.len()).filter(is_part).min_by(|a, b| impulse(*a).total_cmp(&impulse(*b)))
 }
 
 /// Least decrease of the windows' cost by a push that is large enough to matter.
 fn least_gain<const N: usize, const P: usize>(sample: &WindowSet<N>, state: &PushState<'_, N, P>) -> f64 {
     state.min_relevance.powi(2) * sample.motion(&state.scale)
-}
-
-/// Variance of a whitened residual of `samples` values in `windows` windows, with the sum of squares `cost`, as that of independent values of equal
-/// information: what exceeds white noise, as a push of another course over time leaves it, has one value per window and joint.
-fn noise(cost: f64, samples: usize, windows: usize) -> f64 {
-    1.0 + (cost - samples as f64).max(0.0) / windows.max(1) as f64
 }
 
 /// Largest momentum of a rotor against its link, N m s (N s), in the first log of `data` under a model.
@@ -220,187 +298,40 @@ fn impact_impulse<A: Arm<f64, N, P>, const N: usize, const P: usize>(
 
 /// Whether the fitted push (impulse, time, duration) agrees in time and sign with the one seen in the residual torque; where the model leaves errors
 /// unexplained (`remainder`) also in size, as the fit may have taken up part of these errors.
-fn close(fitted: &Vector3<f64>, seen: &Vector3<f64>, remainder: bool) -> bool {
+fn close(fitted: &[f64; 3], seen: &[f64; 3], remainder: bool) -> bool {
     let ratio = fitted[0] / seen[0];
     let near = (fitted[1] - seen[1]).abs() < (MOVED * seen[2]).max(MOVED_LEAST);
     near && if remainder { ratio > 1.0 / CHANGED && ratio < CHANGED } else { ratio > 0.0 }
 }
 
-impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Touched<'_, A, N, P> {
-    /// The log's known pushes and one more push with impulse, time and duration `p`.
-    fn with(&self, p: &Vector3<f64>) -> Vec<EffectInstance> {
-        self.known.iter().copied().chain([EffectInstance { p: (*p).into(), ..self.push }]).collect()
-    }
-
-    /// Whitened residual of the windows under a push with impulse, time and duration `p`.
-    fn residual_of(&self, p: &Vector3<f64>) -> Vec<f64> {
-        self.residual_under(self.model, p)
-    }
-
-    /// Whitened residual of the windows under `model` and a push with impulse, time and duration `p`.
-    fn residual_under(&self, model: &Hypothesis<P>, p: &Vector3<f64>) -> Vec<f64> {
-        let mut data = self.sample.data.clone();
-        data.tracks[0].pushes = self.with(p);
-        let predicted = data.predict(self.arm, model, &self.weighting.offsets);
-        self.weighting.residual(&self.sample.measured, &predicted)
-    }
-
-    /// Cost of the windows under the model `own`, with initial states fitted to this model, and a push with impulse, time and duration `p`.
-    fn cost_under(&self, context: &DiagnosisContext<A, N, P>, own: &Hypothesis<P>, p: &Vector3<f64>) -> f64 {
-        let mut data = self.sample.data.clone();
-        data.tracks[0].pushes = self.with(p);
-        let sample = WindowSet { data, measured: self.sample.measured.clone() };
-        let weighting = context.weighting(&sample, own, self.weighting.scale, &self.weighting.zeros);
-        let there =
-            Touched { arm: self.arm, model: own, sample, weighting, known: self.known, push: self.push };
-        let residual = there.residual_of(p);
-        there.weighting.costs(&there.sample.data, &residual).iter().sum()
-    }
-
-    /// Cost of the windows with the whitened residual `r`, by robust weights.
-    fn cost(&self, r: &[f64]) -> f64 {
-        self.weighting.total(&self.weighting.costs(&self.sample.data, r))
-    }
-
-    /// Shape of the push whose fit by `minimise` has the lowest cost, with impulse, time and duration, and that cost.
-    fn of_all_shapes(
-        &mut self,
-        minimise: impl Fn(&Self) -> (Vector3<f64>, f64),
-    ) -> (&'static dyn Effect<f64>, Vector3<f64>, f64) {
-        let rough = self.push.law;
-        let fits = PulseShape::ALL.map(|shape| {
-            self.push.law = shape.law();
-            let (fitted, left) = minimise(self);
-            (self.push.law, fitted, left)
-        });
-        self.push.law = rough;
-        let [first, second] = fits;
-        if second.2 < first.2 { second } else { first }
-    }
-
-    /// Lowest of the minima reached from the first guess `p` and from longer pushes at the same time: impulse, time and duration, and cost.
-    fn least(&self, p: Vector3<f64>) -> (Vector3<f64>, f64) {
-        LONGER.iter().fold(self.minimise(p), |best, duration| {
-            let other = self.minimise(Vector3::new(p[0], p[1], *duration));
-            if other.1 < best.1 { other } else { best }
-        })
-    }
-
-    /// Levenberg-Marquardt minimum from the first guess `p`: impulse, time and duration of the push, and cost.
-    fn minimise(&self, p: Vector3<f64>) -> (Vector3<f64>, f64) {
-        let (mut p, mut r) = (p, self.residual_of(&p));
-        let (mut cost, mut damping) = (self.cost(&r), 1e-2);
-        for _ in 0..MAX_PUSH_ITERATIONS {
-            let jacobian = self.jacobian(&p, &r);
-            let gram =
-                self.weighting.gram(&self.sample.data, &jacobian.each_ref().map(Vec::as_slice), &r).total;
-            let before = cost;
-            for _ in 0..ATTEMPTS {
-                let Some(next) = damped_step(&p, &gram, damping) else { return (p, cost) };
-                let there = self.residual_of(&next);
-                let lower = self.cost(&there);
-                if lower < cost {
-                    (p, r, cost) = (next, there, lower);
-                    damping = f64::max(damping * 0.2, 1e-9);
-                    break;
-                }
-                damping *= 8.0;
-            }
-            if before - cost <= PUSH_COST_TOLERANCE * before {
-                break;
-            }
-        }
-        (p, cost)
-    }
-
-    /// What is not known of a push's impulse, time and duration because its course over time is not: what another shape changes, as far as that shape's
-    /// residual stays with the push as fitted (by the ratio of both residuals' norms).
-    fn doubt_of_shape(&mut self, p: &Vector3<f64>) -> Vector3<f64> {
-        let law = self.push.law;
-        let left = self.cost(&self.residual_of(p));
-        let mut doubt = Vector3::zeros();
-        for shape in PulseShape::ALL.into_iter().filter(|shape| Some(*shape) != law.pulse_shape()) {
-            self.push.law = shape.law();
-            let (other, its) = self.minimise(*p);
-            doubt = doubt.sup(&((other - p).abs() * (left / its).min(1.0).sqrt()));
-        }
-        self.push.law = law;
-        doubt
-    }
-
-    /// Standard deviations of a push's impulse, time and duration, for a variance of the residual by [`noise`], a model known up to `covariance`, and a
-    /// course over time that is known up to [`Self::doubt_of_shape`].
-    fn sigma(&mut self, p: &Vector3<f64>, covariance: &DMatrix<f64>) -> Option<[f64; 3]> {
-        let of_shape = self.doubt_of_shape(p);
-        let r = self.residual_of(p);
-        let noise = noise(self.cost(&r), self.sample.data.rows * N, self.sample.data.windows.len() * N);
-        let doubts = self.doubts(p, &r, covariance);
-        let own = self.jacobian(p, &r);
-        let columns: Vec<&[f64]> = own.iter().chain(&doubts).map(Vec::as_slice).collect();
-        let k = columns.len();
-        let gram = self.weighting.gram(&self.sample.data, &columns, &r).total;
-        let mut normal = gram.view((0, 0), (k, k)).into_owned() / noise;
-        for i in 3..k {
-            normal[(i, i)] += 1.0;
-        }
-        let inverse = scaled_inverse(&normal)?;
-        Some(std::array::from_fn(|i| inverse[(i, i)].sqrt().hypot(of_shape[i])))
-    }
-
-    /// Whitened changes of the predictions along the principal axes of the model's covariance, each by one standard deviation.
-    fn doubts(&self, p: &Vector3<f64>, r: &[f64], covariance: &DMatrix<f64>) -> Vec<Vec<f64>> {
-        let values = self.model.values();
-        let scale = covariance.diagonal().map(|v| if v > 0.0 && v.is_finite() { v.sqrt() } else { 0.0 });
-        let known = |i: usize| if scale[i] > 0.0 { 1.0 / scale[i] } else { 0.0 };
-        let correlation = DMatrix::from_fn(scale.len(), scale.len(), |i, j| {
-            if scale[i] > 0.0 && scale[j] > 0.0 { covariance[(i, j)] * known(i) * known(j) } else { 0.0 }
-        });
-        let axes = correlation.symmetric_eigen();
-        let column = |k: usize| {
-            let along = AXIS_STEP * axes.eigenvalues[k].max(0.0).sqrt();
-            let moved: Vec<f64> = values
-                .iter()
-                .enumerate()
-                .map(|(i, v)| v + along * scale[i] * axes.eigenvectors[(i, k)])
-                .collect();
-            let there = self.residual_under(&self.model.with_values(&moved), p);
-            r.iter().zip(&there).map(|(a, b)| (a - b) / AXIS_STEP).collect()
-        };
-        (0..scale.len()).filter(|k| axes.eigenvalues[*k] > 1e-9).map(column).collect()
-    }
-
-    /// Derivatives of the whitened prediction by a push's impulse, time and duration.
-    fn jacobian(&self, p: &Vector3<f64>, r: &[f64]) -> [Vec<f64>; 3] {
-        let steps = [1e-4 * p[0].abs().max(1e-12), 1e-5, 1e-5];
-        let slope = |i: usize| {
-            let mut moved = *p;
-            moved[i] += steps[i];
-            r.iter().zip(&self.residual_of(&moved)).map(|(a, b)| (a - b) / steps[i]).collect()
-        };
-        std::array::from_fn(slope)
-    }
-}
-
-/// One damped Gauss-Newton step of a push's impulse, time and duration; `None` for a singular normal matrix.
-fn damped_step(p: &Vector3<f64>, gram: &DMatrix<f64>, damping: f64) -> Option<Vector3<f64>> {
-    let mut normal = gram.view((0, 0), (3, 3)).into_owned();
-    for i in 0..3 {
-        normal[(i, i)] *= 1.0 + damping;
-    }
-    let inverse = scaled_inverse(&normal)?;
-    let change = &inverse * DVector::from_fn(3, |i, _| gram[(i, 3)]);
-    let duration = (p[2] + change[2]).clamp(SHORTEST, LONGEST);
-    Some(Vector3::new(p[0] + change[0], p[1] + change[1], duration))
-}
-
 /// Windows that a push touches, as a dataset of the push's log alone.
 fn around<const N: usize>(sample: &WindowSet<N>, disturbance: &Disturbance) -> Dataset<N> {
     let track = &sample.data.tracks[disturbance.track];
-    let [_, time, duration] = disturbance.push.p;
-    let reach = 0.75 * duration + MAX_WINDOW_DISTANCE;
-    sample
-        .data
-        .of_track(disturbance.track, |w| track.t[w.first] < time + reach && track.t[w.last] > time - reach)
+    sample.data.of_track(disturbance.track, |w| disturbance.reaches(track, w))
+}
+
+impl Disturbance {
+    /// Whether a window of the push's log takes part in the fit of the push.
+    fn reaches<const N: usize>(&self, track: &Track<N>, window: &Window<N>) -> bool {
+        let [_, time, duration] = self.push.p;
+        let reach = ACTS * duration + MAX_WINDOW_DISTANCE;
+        track.t[window.first] < time + reach && track.t[window.last] > time - reach
+    }
+
+    /// Whether two pushes act on one joint of a log at the same time, so that they are one push of another course over time.
+    pub(super) fn overlaps(&self, other: &Self) -> bool {
+        let apart = (self.push.p[1] - other.push.p[1]).abs();
+        self.place() == other.place()
+            && self.push.joint == other.push.joint
+            && apart < 0.5 * (self.push.p[2] + other.push.p[2])
+    }
+
+    /// Whether one of two pushes of a log acts in windows of the length `window`, s, that take part in the fit of the other.
+    pub(super) fn is_near(&self, other: &Self, window: f64) -> bool {
+        let acts = ACTS * (self.push.p[2] + other.push.p[2]);
+        let apart = (self.push.p[1] - other.push.p[1]).abs();
+        self.place() == other.place() && apart < acts + MAX_WINDOW_DISTANCE + window
+    }
 }
 
 #[cfg(test)]
@@ -410,10 +341,41 @@ mod tests {
     use armgap_core::arm::Pendulum;
     use armgap_core::effect::find;
 
+    fn push(joint: usize, [impulse, time, duration]: [f64; 3]) -> Disturbance {
+        let law = find::<f64>("external_pulse").expect("known");
+        let push = EffectInstance::new(law, joint, [impulse, time, duration]);
+        Disturbance {
+            holdout: false,
+            track: 0,
+            push,
+            sigma: [0.0; 3],
+            share: 1.0,
+            probability: 1.0,
+            light: false,
+        }
+    }
+
     #[test]
-    fn what_exceeds_white_noise_counts_once_per_window() {
-        assert_eq!(noise(350.0, 400, 4), 1.0);
-        assert_eq!(noise(480.0, 400, 4), 21.0);
+    fn of_two_pushes_on_one_joint_at_one_time_the_lesser_is_part_of_the_other() {
+        let open =
+            |pushes: &[Disturbance]| -> Vec<_> { pushes.iter().map(|p| (p.clone(), p.clone())).collect() };
+        let large = push(0, [2.0, 3.0, 0.2]);
+        for (other, part) in [
+            (push(0, [-0.5, 3.12, 0.1]), Some(1)),
+            (push(0, [-0.5, 3.16, 0.1]), None),
+            (push(1, [-0.5, 3.0, 0.1]), None),
+            (push(0, [5.0, 3.0, 0.1]), Some(0)),
+        ] {
+            assert_eq!(part_of_another(&open(&[large.clone(), other])), part);
+        }
+    }
+
+    #[test]
+    fn pushes_are_near_where_one_acts_in_windows_of_the_other() {
+        let first = push(0, [1.0, 3.0, 0.2]);
+        for (time, near) in [(3.3, true), (3.75, true), (3.85, false), (2.0, false)] {
+            assert_eq!(first.is_near(&push(1, [1.0, time, 0.2]), 0.25), near, "{time}");
+        }
     }
 
     /// Rotor behind backlash beside a link that is held: after a reversal of the torque it crosses the whole gap under this torque alone.

@@ -11,6 +11,7 @@
 //! * `residual`: residual torque of a whole log under a model.
 //! * `scatter`: standard deviation of a joint's residual torque at every point of a log.
 //! * `search`: pushes that stand out of the residual torque of one log.
+//! * `touched`: windows that pushes touch, and the fit of these pushes together.
 
 pub(crate) mod bell;
 pub(crate) mod fit;
@@ -23,3 +24,4 @@ pub mod push;
 pub(crate) mod residual;
 pub(crate) mod scatter;
 pub(crate) mod search;
+pub(crate) mod touched;

@@ -16,7 +16,7 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 /// Cost of a window, relative to that of a typical window, from which a push is looked for in the window.
-const OUTLYING: f64 = 30.0;
+pub(super) const OUTLYING: f64 = 30.0;
 
 /// Least share that a push in an outlying window must explain of the cost of the windows that it touches.
 const OUTLYING_EXPLAINED_SHARE: f64 = 0.8;
@@ -52,9 +52,11 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let state = &PushState { min_relevance: state.faintest, ..*state };
         while disturbances.len() < MAX_PUSHES {
             let rough = self.in_worst_window(place, state, disturbances);
-            let sized = rough.and_then(|rough| self.sized(rough, state, own, disturbances, &[]));
+            let sized = rough.and_then(|rough| self.sized(&rough, rough.push, state, own, disturbances));
             let Some(disturbance) = sized.filter(|e| {
-                e.share > OUTLYING_EXPLAINED_SHARE && e.push.p[0].abs() > OUTLYING_IMPULSE * e.sigma[0]
+                e.share > OUTLYING_EXPLAINED_SHARE
+                    && e.push.p[0].abs() > OUTLYING_IMPULSE * e.sigma[0]
+                    && !disturbances.iter().any(|known| known.overlaps(e))
             }) else {
                 return;
             };
@@ -64,7 +66,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
 
     /// The push that explains most of the cost of the window with the largest cost, to first order; `None` if that cost is not far above the typical
     /// one.
-    fn in_worst_window(
+    pub(super) fn in_worst_window(
         &self,
         place: Place,
         state: &PushState<'_, N, P>,

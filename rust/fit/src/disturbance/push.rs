@@ -42,9 +42,6 @@ const UNCLEAR: f64 = 0.02;
 /// Least impulse of a push, in standard deviations of the impulse, for it to differ significantly from zero.
 const SIGNIFICANT_IMPULSE: f64 = 2.0;
 
-/// Time between two pulses on different joints up to which they are of one push, s.
-const MEANWHILE: f64 = 0.15;
-
 /// Shortest recording in which pushes are looked for, s.
 const SHORTEST_LOG: f64 = 1.5;
 
@@ -220,22 +217,11 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             let rough = |bell| Some(Disturbance { light, ..self.rough(places, bell, found.rest)? });
             bells.iter().filter_map(rough).collect()
         };
-        let rough = [of(&found.bells, false), of(&found.light, true)].concat();
+        let seen = [of(&found.bells, false), of(&found.light, true)].concat();
         let mut disturbances: Vec<Disturbance> = Vec::new();
-        let mut together = Vec::new();
-        for (i, one) in rough.iter().enumerate() {
-            // A push on the last link acts on all joints: beside what it does on the others the one on this joint explains the motion.
-            let meanwhile: Vec<Disturbance> =
-                rough[i + 1..].iter().filter(|other| one.is_with(other)).cloned().collect();
-            let sized = self.sized(one.clone(), state, own, &disturbances, &meanwhile);
-            together.extend(sized.iter().map(|_| !meanwhile.is_empty()));
+        for near in near_each_other(seen, self.horizon) {
+            let sized = self.sized_together(near, state, own, &disturbances);
             disturbances.extend(sized);
-        }
-        for i in (0..disturbances.len()).rev().filter(|i| together[*i]) {
-            let one = disturbances.remove(i);
-            if let Some(sized) = self.sized(one, state, own, &disturbances, &[]) {
-                disturbances.insert(i, sized);
-            }
         }
         let all = [found.bells, found.light].concat();
         disturbances.retain(|e| e.is_known() && !self.meets_an_end(e, &all));
@@ -340,13 +326,6 @@ impl Disturbance {
         self.push.p[0].abs() / self.sigma[0]
     }
 
-    /// Whether another push acts on another joint at the same time.
-    fn is_with(&self, other: &Self) -> bool {
-        self.place() == other.place()
-            && self.push.joint != other.push.joint
-            && (self.push.p[1] - other.push.p[1]).abs() < MEANWHILE
-    }
-
     /// Casts doubt on the push beside a model that leaves the share `left`, 0 to 1, of the gap unexplained.
     pub(crate) fn doubt_beside(&mut self, left: f64) {
         self.probability = beside_remainder(self.probability, belief_beside(left, REMAINDER_DOUBT));
@@ -370,6 +349,27 @@ fn beside_remainder(alone: f64, belief: f64) -> f64 {
     alone * (1.0 - (1.0 - belief) * ((1.0 - alone) / UNCLEAR).min(1.0))
 }
 
+/// Pushes in groups, each of those that are near each other in time or near one of the group, in the order of the first of each group. A push near another
+/// one explains the motion beside it alone, as one at the tip does that acts on all joints.
+fn near_each_other(pushes: Vec<Disturbance>, window: f64) -> Vec<Vec<Disturbance>> {
+    let mut groups: Vec<Vec<Disturbance>> = Vec::new();
+    for push in pushes {
+        let is_near = |group: &Vec<Disturbance>| group.iter().any(|other| other.is_near(&push, window));
+        let Some(first) = groups.iter().position(is_near) else {
+            groups.push(vec![push]);
+            continue;
+        };
+        for k in (first + 1..groups.len()).rev() {
+            if is_near(&groups[k]) {
+                let joined = groups.remove(k);
+                groups[first].extend(joined);
+            }
+        }
+        groups[first].push(push);
+    }
+    groups
+}
+
 /// Name of a log up to the bracket that tells which part of the recording it is.
 fn stem(name: &str) -> &str {
     name.split(" (").next().unwrap_or(name)
@@ -378,6 +378,29 @@ fn stem(name: &str) -> &str {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn pushes_that_a_third_links_are_of_one_group() {
+        let law = find::<f64>("external_pulse").expect("known");
+        let at = |time: f64| {
+            let push = EffectInstance::new(law, 0, [1.0, time, 0.1]);
+            Disturbance {
+                holdout: false,
+                track: 0,
+                push,
+                sigma: [0.0; 3],
+                share: 1.0,
+                probability: 1.0,
+                light: false,
+            }
+        };
+        let times = |pushes: &[f64]| -> Vec<Vec<f64>> {
+            let groups = near_each_other(pushes.iter().map(|t| at(*t)).collect(), 0.25);
+            groups.iter().map(|group| group.iter().map(|e| e.push.p[1]).collect()).collect()
+        };
+        assert_eq!(times(&[1.0, 5.0, 2.0]), [vec![1.0], vec![5.0], vec![2.0]]);
+        assert_eq!(times(&[1.0, 2.0, 1.5, 5.0]), [vec![1.0, 2.0, 1.5], vec![5.0]]);
+    }
 
     #[test]
     fn a_remainder_casts_doubt_on_pushes_that_hardly_exceed_the_other_pulses_of_their_log() {
