@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 
 from armgap import Arm, Log, simulate
 from armgap.check.drive_limit import slewed
+from armgap.diagnosis.drive_laws import all_laws
 from armgap.diagnosis.laws_in_place import LawInPlace, doubt, laws_in_place, say_withheld, withheld
 from armgap.report.pushes import times_of_pushes
 
@@ -45,16 +47,31 @@ def impulses(missing: NDArray[np.float64], threshold: float) -> list[dict[str, A
     ]
 
 
+def swung(torque: Callable[[int, float, float], float]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return positions and delivered torques of the pendulum under a torque of sample, position and velocity."""
+    inertia, weight, viscous, coulomb = PENDULUM.theta
+    q, dq, step = 0.0, 0.0, 0.25 * PERIOD
+    positions, delivered = np.empty(len(TIMES)), np.empty(len(TIMES))
+    for k in range(len(TIMES)):
+        positions[k], delivered[k] = q, torque(k, q, dq)
+        for _ in range(4):
+            dq += step * (delivered[k] - weight * np.sin(q) - viscous * dq - coulomb * np.tanh(dq / 0.05)) / inertia
+            q += step * dq
+    return positions, delivered
+
+
 @pytest.mark.parametrize("name", ["torque_speed_limit", "torque_asymmetric_limit"])
 def test_a_law_of_the_drive_gives_the_impulses_of_all_pushes(name: str) -> None:
-    q = np.sin(2 * np.pi * 0.4 * TIMES) + 0.4 * np.sin(2 * np.pi * 1.1 * TIMES)
-    speed = np.gradient(q, TIMES)
     tau = 2.0 * np.cos(2 * np.pi * 0.31 * TIMES + 0.4) + 1.0 * np.cos(2 * np.pi * 0.83 * TIMES)
-    if name == "torque_speed_limit":
-        limit = np.where(tau * speed > 0.0, np.maximum(2.6 - 0.5 * np.abs(speed), 0.0), np.inf)
-        missing = np.clip(tau, -limit, limit) - tau
-    else:
-        missing = np.clip(tau, -2.2, 2.7) - tau
+
+    def limited(k: int, q: float, dq: float) -> float:
+        if name == "torque_asymmetric_limit":
+            return float(np.clip(tau[k], -2.2, 2.7))
+        limit = max(2.6 - 0.5 * abs(dq), 0.0) if tau[k] * dq > 0.0 else np.inf
+        return float(np.clip(tau[k], -limit, limit))
+
+    q, delivered = swung(limited)
+    missing = delivered - tau
     pushes = impulses(missing, 0.02)
     assert len(pushes) >= 3
     (law,) = found(pushes, tau, q)
@@ -64,17 +81,16 @@ def test_a_law_of_the_drive_gives_the_impulses_of_all_pushes(name: str) -> None:
     assert apart == {"external_pulse", "actuator_lag", "actuator_delay"}, "no lag takes up what the pushes were"
     stretches = [push | {"log": f"run ({2 * i} to {2 * i + 2} s)"} for i, push in enumerate(pushes)]
     assert [other.name for other in found(stretches, tau, q)] == [name], "in stretches of the log"
-    # Pushes of the same impulses at other times are no law's.
-    for push in pushes:
-        push["parameters"]["time"]["value"] += 0.37
-    assert all(other.name == "uneven_friction" for other in found(pushes, tau, q))
+    # Where the motion is that of the whole command, the law has the impulses and explains no torque.
+    free, _ = swung(lambda k, _, __: float(tau[k]))
+    assert all(other.name == "uneven_friction" for other in found(pushes, tau, free))
 
 
 def test_a_limit_of_one_direction_stands_behind_the_named_limit_of_the_other() -> None:
-    q = np.sin(2 * np.pi * 0.4 * TIMES)
     tau = 3.0 * np.cos(2 * np.pi * 0.31 * TIMES + 0.4)
     limited = np.clip(tau, -2.4, 2.4)
-    pushes = impulses(np.clip(tau, -2.4, 1.9) - limited, 0.02)
+    q, delivered = swung(lambda k, _, __: float(np.clip(limited[k], -2.4, 1.9)))
+    pushes = impulses(delivered - limited, 0.02)
     assert len(pushes) >= 2
     saturation = {
         "effect": "torque_saturation",
@@ -86,6 +102,26 @@ def test_a_limit_of_one_direction_stands_behind_the_named_limit_of_the_other() -
     assert law.name == "torque_asymmetric_limit"
     up = float(law.why.split("limits of ")[1].split()[0])
     assert up == pytest.approx(1.9, rel=0.1)
+
+
+def test_a_controller_that_answers_pushes_is_no_limit_of_its_drive() -> None:
+    reference = 0.5 * np.sin(2 * np.pi * 0.4 * TIMES)
+    pushes = [pushed(time, impulse) for time, impulse in ((1.5, 0.3), (3.1, 0.25), (5.2, 0.35))]
+    given = np.zeros(len(TIMES))
+    for push in pushes:
+        time, duration, impulse = (push["parameters"][key]["value"] for key in ("time", "duration", "impulse"))
+        given[np.abs(TIMES - time) <= 0.5 * duration] = impulse / duration
+    rate = np.gradient(reference, TIMES)
+
+    def commanded(k: int, q: float, dq: float) -> float:
+        return float(40.0 * (reference[k] - q) + 4.0 * (rate[k] - dq))
+
+    q, delivered = swung(lambda k, q, dq: commanded(k, q, dq) + given[k])
+    tau = delivered - given
+    behind = [law for law in all_laws([Log("run", TIMES, q[:, None], tau[:, None], None)], 0)]
+    taken = min(abs(float(np.sum(law.added[0]) * PERIOD) / 0.9 - 1.0) for law in behind)
+    assert taken < 0.1, "some limit takes the impulse of the pushes from the controller's answer"
+    assert not [law for law in found(pushes, tau, q) if law.name != "uneven_friction"]
 
 
 def test_a_drive_of_limited_rate_passes_for_a_delay_and_pushes() -> None:
