@@ -18,6 +18,7 @@ from armgap.check import Corrections
 from armgap.diagnosis import diagnosis_schema
 from armgap.diagnosis.drive import Drive
 from armgap.diagnosis.drive_chain import LEAST_SHARE, ChainEntry, drive_chain
+from armgap.diagnosis.encoders import error_of_encoder
 from armgap.errors import ColumnError
 from armgap.report.output import diagnosis_report
 
@@ -203,6 +204,41 @@ def test_a_soft_transmission_shows_in_the_second_encoder() -> None:
     assert (entries[0]["stage"], entries[0]["joint"]) == ("transmission", 1)
     assert entries[0]["share"] > 0.5
     assert "parameters" not in entries[0]
+
+
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [("late", "first encoder is 6 ms behind the second"), ("off centre", "8 mrad times a sine"), ("soft", None)],
+)
+def test_an_encoder_in_error_is_told_from_a_transmission(kind: str, words: str | None) -> None:
+    rng = np.random.default_rng(4)
+    t = np.arange(2500) * 0.004
+    size, rate, phase = rng.uniform(0.1, 0.4, 5), rng.uniform(0.5, 9.0, 5), rng.uniform(0, 6, 5)
+
+    def angle(t: Array) -> Array:
+        return np.sum(size * np.sin(t[:, None] * rate + phase), axis=1)
+
+    link = angle(t)
+    speed = np.gradient(link, t)
+    tau = 0.05 * np.gradient(speed, t) + 0.6 * np.sin(link) + 0.02 * speed + 0.1 * np.tanh(speed / 0.02)
+    first = {"late": angle(t - 0.006), "off centre": link + 0.008 * np.sin(link + 0.4), "soft": link + tau / 12.0}[kind]
+    noisy = [x + NOISE * rng.normal(size=len(t)) for x in (first, link)]
+    log = Log.from_arrays(t, noisy[0], tau, q_link=noisy[1], name=kind)
+    said = error_of_encoder([log], 0)
+    assert said is None if words is None else said is not None and words in said
+
+
+def test_drives_that_are_late_alike_are_found_together() -> None:
+    """A delay of one drive is none beside the other drive's command: only both measured torques together make predictions better."""
+
+    def late(log: Log) -> Log:
+        early = np.concatenate([log.tau[3:], np.repeat(log.tau[-1:], 3, axis=0)])
+        return replace(log, tau=early, tau_meas=log.tau)
+
+    training, holdout = logs(drive=False)
+    entries = chain([late(log) for log in training], [late(log) for log in holdout])
+    shares = {(e["stage"], e["joint"]): e["share"] for e in entries}
+    assert shares["drive", 1] + shares["drive", 2] > 0.8
 
 
 def test_a_serial_arm_is_judged_by_its_torques(tmp_path: Path) -> None:

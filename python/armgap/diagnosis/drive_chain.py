@@ -5,9 +5,11 @@ removes the drive from the prediction, and the position `q_link` of a second enc
 transmission. The arm's parameters are re-estimated each time. With S the signals in use and E_j(S) the RMS error that is left at joint j,
 
     whole gap             E2 = sum_j E_j()^2, nothing replaced
-    drive, transmission   decrease of sum_j E_j(S)^2 by the replacement of the joint's signal, over E2; signals are replaced one by one, the
-                          one with the largest decrease first, as long as the decrease is at least `LEAST_SHARE` of E2
-    sensor                min(floor_j, E_j(S))^2 / E2 at the end, with the error `floor_j` that the sensors' own noise makes
+    drive, transmission   decrease of sum_j E_j(S)^2 by the replacement of the joint's signal, over E2; signals are replaced one by one, or those of
+                          one kind on all joints together where that decreases it further, the largest decrease first, as long as it is at
+                          least `LEAST_SHARE` of E2
+    sensor                min(floor_j, E_j(S))^2 / E2 at the end, with the error `floor_j` that the sensors' own noise makes, and what the
+                          second encoder takes from the gap where the difference of both is an error of an encoder
     mechanics             (E_j(S)^2 - floor_j^2) / E2 at the end, where that is above zero
 
 so that all shares lie between 0 and 1 and add up to 1. E_j is the error of predictions over the horizon on the holdout; of serial arms, the root of
@@ -27,6 +29,7 @@ from armgap.arm.arm import Arm
 from armgap.check.contradiction import Refit
 from armgap.check.serial import weak_form
 from armgap.diagnosis.drive import Drive
+from armgap.diagnosis.encoders import error_of_encoder
 from armgap.literals import ChainStage
 from armgap.log.log import Log
 from armgap.progress import report_progress
@@ -172,20 +175,39 @@ def drive_chain(
     if not np.isfinite(whole):
         return []  # diverging predictions give no measure of the gap
     noise = np.minimum(np.zeros(arm.n_joints) if arm.chain is not None else np.square(floor), left)
-    shares = {
+    shares: dict[tuple[ChainStage, int], float] = {
         **{(s.stage, s.joint): 0.0 for s in signals},
         **{(s.stage, s.joint): gain for s, gain in gains.items()},
         **{("mechanics", j): float(left[j] - noise[j]) / whole for j in range(arm.n_joints)},
         **{("sensor", j): float(noise[j]) / whole for j in range(arm.n_joints)},
     }
     used = {(s.stage, s.joint) for s in gains}
+    errors = _of_encoders(shares, used, [*training, *holdout])
     entries = [
         _entry(case, stage, joint, share, (stage, joint) in used, drives.get(joint) if stage == "drive" else None)
         for (stage, joint), share in shares.items()
     ]
+    for entry in entries:
+        if entry["stage"] == "sensor" and (error := errors.get(entry["joint"] - 1)):
+            entry["detail"] = (
+                f"{error}; with the position of the second one in place of the first predictions miss by that much less"
+            )
     return sorted(
         (e for e in entries if e["share"] >= LEAST_SHARE or "parameters" in e), key=lambda e: e["share"], reverse=True
     )
+
+
+def _of_encoders(
+    shares: dict[tuple[ChainStage, int], float], used: set[tuple[ChainStage, int]], logs: Sequence[Log]
+) -> dict[int, str]:
+    """Give the sensor of a joint what the second encoder takes from the gap, where an encoder is in error; return these errors in words, by joint."""
+    found = {}
+    for stage, joint in used:
+        if stage == "transmission" and (error := error_of_encoder(logs, joint)):
+            found[joint] = error
+            shares["sensor", joint] += shares["transmission", joint]
+            shares["transmission", joint] = 0.0
+    return found
 
 
 def _replaced(case: _Case, signals: Sequence[_Signal]) -> tuple[dict[_Signal, float], Array, float]:
@@ -196,14 +218,48 @@ def _replaced(case: _Case, signals: Sequence[_Signal]) -> tuple[dict[_Signal, fl
     rest = list(signals)
     while rest:
         report_progress("comparing the stages of the chain", 1.0 - len(rest) / len(signals))
-        tried = [(signal, case.left((*gains, signal))) for signal in rest]
-        signal, after = min(tried, key=lambda found: float(found[1].sum()))
-        gain = float(left.sum() - after.sum()) / whole
-        if gain < LEAST_SHARE:
+        used = tuple(gains)
+        one = _best(case, used, [(signal,) for signal in rest])
+        found = _best(case, used, list(_together(rest)), one, LEAST_SHARE * whole)
+        if left.sum() - found[1].sum() < LEAST_SHARE * whole:
             break
-        gains[signal], left = gain, after
-        rest = [other for other in rest if (other.stage, other.joint) != (signal.stage, signal.joint)]
+        gains |= _by_joint(found[0], left, found[1], whole)
+        left = found[1]
+        rest = [s for s in rest if all((s.stage, s.joint) != (u.stage, u.joint) for u in found[0])]
     return gains, left, whole
+
+
+def _together(signals: Sequence[_Signal]) -> Iterator[tuple[_Signal, ...]]:
+    """Yield the signals of one kind on all joints that still have one: a delay that all drives share is none beside the other drives' commands."""
+    for stage, after in dict.fromkeys((s.stage, s.after) for s in signals):
+        alike = tuple(s for s in signals if (s.stage, s.after) == (stage, after))
+        if len(alike) > 1:
+            yield alike
+
+
+_Found = tuple[tuple[_Signal, ...], Array]
+
+
+def _best(
+    case: _Case,
+    used: tuple[_Signal, ...],
+    sets: Sequence[tuple[_Signal, ...]],
+    known: _Found | None = None,
+    margin: float = 0.0,
+) -> _Found:
+    """Return the signals of `sets` that leave least beside those in use, and what is left; `known` unless they leave less by `margin`."""
+    tried = [(signals, case.left((*used, *signals))) for signals in sets]
+    best = min(tried, key=lambda found: float(found[1].sum()), default=known)
+    assert best is not None
+    return known if known is not None and best[1].sum() > known[1].sum() - margin else best
+
+
+def _by_joint(signals: Sequence[_Signal], before: Array, after: Array, whole: float) -> dict[_Signal, float]:
+    """Return the part of the whole gap that signals remove together, by signal: in proportion to what is removed at their joints."""
+    gain = float(before.sum() - after.sum()) / whole
+    removed = np.array([max(before[s.joint] - after[s.joint], 0.0) for s in signals])
+    parts = removed / removed.sum() if removed.sum() > 0.0 else np.full(len(signals), 1.0 / len(signals))
+    return {signal: gain * float(part) for signal, part in zip(signals, parts, strict=True)}
 
 
 def _entry(case: _Case, stage: ChainStage, joint: int, share: float, used: bool, drive: Drive | None) -> ChainEntry:
