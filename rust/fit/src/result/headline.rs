@@ -42,6 +42,10 @@ pub struct Headline<const N: usize, const P: usize> {
     pub disturbance_candidates: Vec<Unnamed<Disturbance>>,
 }
 
+/// Ratio of the errors of two models up to which held-out motion does not tell which is better: a stop that it does not reach, or a load that re-estimated
+/// parameters absorb, changes them by chance. Three right causes of two simulators were withheld at ratios of 1.005 to 1.03.
+const NO_WORSE: f64 = 1.05;
+
 /// Adds the squared biases of a cause's values to their variances.
 fn widen<const P: usize>(cause: &mut Cause, bias: &HorizonBias<P>) {
     let Some(biases) = bias.of_effect(&cause.effect) else { return };
@@ -50,9 +54,9 @@ fn widen<const P: usize>(cause: &mut Cause, bias: &HorizonBias<P>) {
     }
 }
 
-/// Whether errors `found`, one per joint, are larger than `given` in sum.
+/// Whether errors `found`, one per joint, are larger in sum than `given` by more than held-out motion may show by chance.
 fn is_worse(found: &[f64], given: &[f64]) -> bool {
-    found.iter().sum::<f64>() > given.iter().sum()
+    found.iter().sum::<f64>() > NO_WORSE * given.iter().sum::<f64>()
 }
 
 /// Makes all named causes candidates, because predictions with them are worse than those of another model, given in words.
@@ -310,6 +314,7 @@ mod tests {
             ground: Ground::Motion,
         };
         assert!(is_worse(&[0.5, 9.0], &[1.0, 2.0]) && !is_worse(&[0.5, 2.0], &[2.0, 1.0]));
+        assert!(is_worse(&[1.0, 2.2], &[1.0, 2.0]) && !is_worse(&[1.0, 2.1], &[1.0, 2.0]), "by chance");
         let (mut named, mut rest) =
             (vec![cause.clone()], vec![Unnamed { found: cause, why: "small".to_owned() }]);
         withhold(&mut named, &mut rest, "by the arm file as it stands");
