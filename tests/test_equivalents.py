@@ -14,6 +14,7 @@ from armgap.diagnosis.equivalents import (
     common_gain,
     encoder_scale,
     gear_losses,
+    late_positions,
     low_pass,
     torque_loop,
 )
@@ -30,6 +31,23 @@ def test_a_lag_beside_a_low_pass_may_be_the_low_pass() -> None:
     assert (first["probability"], second["probability"]) == (0.49, 0.98)
     assert [e["effect"] for e in first["equivalents"]] == ["filtered_positions"]
     assert not second["equivalents"]
+
+
+def test_a_delay_beyond_that_of_the_measured_torque_may_be_late_positions() -> None:
+    def equivalents(measured: float, effect: str = "actuator_delay", joint: int = 1) -> list[str]:
+        name = "delay" if effect == "actuator_delay" else "time_constant"
+        cause = {"effect": effect, "joint": joint, "equivalents": [], "parameters": {name: {"value": 0.008}}}
+        drive = {
+            "stage": "drive",
+            "joint": 1,
+            "share": 0.0,
+            "parameters": {"delay": {"value": measured, "sigma": 0.0002}},
+        }
+        late_positions({"causes": [cause], "chain": [{"stage": "mechanics", "joint": 1, "share": 1.0}, drive]})
+        return [e["effect"] for e in cause["equivalents"]]
+
+    assert equivalents(0.001) == equivalents(0.001, "actuator_lag") == ["late_positions"]
+    assert equivalents(0.0075) == equivalents(0.001, joint=2) == []
 
 
 def test_an_elastic_joint_without_rotor_beside_a_delay_may_be_the_torque_loop() -> None:

@@ -28,6 +28,7 @@ from armgap.diagnosis.equivalents import (
     common_gain,
     encoder_scale,
     gear_losses,
+    late_positions,
     low_pass,
     torque_loop,
 )
@@ -207,6 +208,7 @@ def _diagnose(given: PreparedInput, settings: dict[str, Any], effects: Sequence[
     data["chain"] = (
         [] if contradictory else drive_chain(arm, training, held, horizon=gap["horizon_s"], floor=gap["floor"])
     )
+    late_positions(data)
     data["input"] = _input(arm, training, held)
     data["provenance"] = given.provenance
     remarks: list[LogRemark] = [

@@ -12,7 +12,16 @@ from armgap.arm.arm import Arm
 from armgap.check.check import Check
 from armgap.log.log import Log
 
-__all__ = ["beside", "center_of_mass", "common_gain", "encoder_scale", "gear_losses", "low_pass", "torque_loop"]
+__all__ = [
+    "beside",
+    "center_of_mass",
+    "common_gain",
+    "encoder_scale",
+    "gear_losses",
+    "late_positions",
+    "low_pass",
+    "torque_loop",
+]
 
 Array = NDArray[np.float64]
 
@@ -23,6 +32,9 @@ _TOLD = 2.0
 #: Relative difference of a gain from the one that belongs to a gear's loss, up to which both are one gear that loses torque in both directions. On
 #: five simulated arms of another hand whose friction is a share of the transmitted torque it was 0.01 to 0.06.
 _SAME_GEAR = 0.1
+#: Delay of a joint's motion beyond that of its measured torque from which the positions are late. On simulated arms of another hand it was 3.5 ms and
+#: more for 11 late or low-passed encoders, and at most 0.7 ms where the drive was late [s].
+_LATE_POSITIONS_S = 0.002
 #: Largest excess of the prior cost with a common factor of all torques over that with a payload, per value that the payload has more.
 _BY_CHANCE = 1.0
 #: Share of the variance of an encoder's error along the logs that a straight line over the position has to explain for a wrong scale to do the same.
@@ -44,6 +56,23 @@ def low_pass(data: dict[str, Any], checks: Sequence[Check]) -> None:
             for joint in sorted(found):
                 why = f"q{joint} is smoother than its encoder: a low-pass before logging delays positions as much"
                 cause["equivalents"].append(beside("filtered_positions", joint, why))
+
+
+def late_positions(data: dict[str, Any]) -> None:
+    """Add late positions to the equivalents of causes that delay a joint's torque, where the measured torque follows the command sooner than that."""
+    late = {"actuator_delay": "delay", "actuator_lag": "time_constant"}
+    drives = {entry["joint"]: entry["parameters"]["delay"] for entry in data["chain"] if "parameters" in entry}
+    for cause in data["causes"]:
+        drive = drives.get(cause["joint"])
+        if drive is None or cause["effect"] not in late:
+            continue
+        beyond = cause["parameters"][late[cause["effect"]]]["value"] - drive["value"]
+        if beyond > _LATE_POSITIONS_S + _TOLD * drive["sigma"]:
+            why = (
+                f"the measured torque follows the command {1e3 * drive['value']:.2g} ms late: the positions are late by the other "
+                f"{1e3 * beyond:.2g} ms, as by a delay or filter of the encoder"
+            )
+            cause["equivalents"].append(beside("late_positions", cause["joint"], why, separates=True))
 
 
 def torque_loop(data: dict[str, Any]) -> None:
