@@ -212,7 +212,7 @@ fn shaped(pushes: &[EffectInstance], law: &'static dyn Effect<f64>) -> Vec<Effec
     pushes.iter().map(|push| EffectInstance { law, ..*push }).collect()
 }
 
-/// One damped Gauss-Newton step of impulses, times and durations; `None` for a singular normal matrix.
+/// One damped Gauss-Newton step of impulses, times and durations; `None` for a normal matrix that is singular or not finite.
 fn damped_step(free: &[EffectInstance], gram: &DMatrix<f64>, damping: f64) -> Option<Vec<EffectInstance>> {
     let count = VALUES * free.len();
     let mut normal = gram.view((0, 0), (count, count)).into_owned();
@@ -221,6 +221,9 @@ fn damped_step(free: &[EffectInstance], gram: &DMatrix<f64>, damping: f64) -> Op
     }
     let inverse = scaled_inverse(&normal)?;
     let change = &inverse * DVector::from_fn(count, |i, _| gram[(i, count)]);
+    if change.iter().any(|x| !x.is_finite()) {
+        return None;
+    }
     let moved = free.iter().zip(change.as_slice().chunks_exact(VALUES)).map(|(push, change)| {
         let [impulse, time, duration] = push.p;
         let duration = (duration + change[2]).clamp(SHORTEST, LONGEST);
@@ -238,6 +241,19 @@ fn noise(cost: f64, samples: usize, windows: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use armgap_core::effect::find;
+
+    #[test]
+    fn a_step_that_is_not_finite_is_none() {
+        let law = find::<f64>("external_pulse").expect("known");
+        let free = [EffectInstance::new(law, 0, [1.0, 2.0, 0.1])];
+        let mut gram = DMatrix::<f64>::identity(4, 4);
+        gram[(0, 3)] = 0.5;
+        let step = damped_step(&free, &gram, 0.0).expect("regular");
+        assert!((step[0].p[0] - 1.5).abs() < 1e-9 && step[0].p[1..2] == [2.0], "{:?}", step[0].p);
+        gram[(1, 3)] = f64::NAN;
+        assert!(damped_step(&free, &gram, 0.0).is_none());
+    }
 
     #[test]
     fn what_exceeds_white_noise_counts_once_per_window() {
