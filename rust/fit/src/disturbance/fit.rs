@@ -323,7 +323,7 @@ impl Disturbance {
         let apart = (self.push.p[1] - other.push.p[1]).abs();
         self.place() == other.place()
             && self.push.joint == other.push.joint
-            && apart < 0.5 * (self.push.p[2] + other.push.p[2])
+            && apart < ACTS * (self.push.p[2] + other.push.p[2])
     }
 
     /// Whether one of two pushes of a log acts in windows of the length `window`, s, that take part in the fit of the other.
@@ -361,8 +361,8 @@ mod tests {
             |pushes: &[Disturbance]| -> Vec<_> { pushes.iter().map(|p| (p.clone(), p.clone())).collect() };
         let large = push(0, [2.0, 3.0, 0.2]);
         for (other, part) in [
-            (push(0, [-0.5, 3.12, 0.1]), Some(1)),
-            (push(0, [-0.5, 3.16, 0.1]), None),
+            (push(0, [-0.5, 3.2, 0.1]), Some(1)),
+            (push(0, [-0.5, 3.24, 0.1]), None),
             (push(1, [-0.5, 3.0, 0.1]), None),
             (push(0, [5.0, 3.0, 0.1]), Some(0)),
         ] {
