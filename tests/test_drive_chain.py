@@ -226,6 +226,7 @@ def test_an_encoder_in_error_is_told_from_a_transmission(kind: str, words: str |
     log = Log.from_arrays(t, noisy[0], tau, q_link=noisy[1], name=kind)
     said = error_of_encoder([log], 0)
     assert said is None if words is None else said is not None and words in said
+    assert error_of_encoder([log.part(0, 40, kind)], 0) is None, "too short to tell"
 
 
 def test_drives_that_are_late_alike_are_found_together() -> None:

@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 
 #: Length of the moving mean, taken twice, of all signals that are compared [s].
 _SMOOTH_S = 0.03
+#: Lengths of the moving mean that a log has to exceed: four go to its ends.
+_FEWEST_WIDTHS = 10
 #: Share of the difference's variance from which speed or angle explain it: 0.99 and more for late and low-passed encoders, and those off centre, of
 #: a simulator of another hand.
 _TELLS = 0.95
@@ -38,7 +40,7 @@ def error_of_encoder(logs: Sequence[Log], joint: int) -> str | None:
     joint : int
         The joint, from 0.
     """
-    parts = [_signals(log, joint) for log in logs if log.q_link is not None]
+    parts = [_signals(log, joint) for log in logs if log.q_link is not None and len(log) > _FEWEST_WIDTHS * _width(log)]
     if not parts:
         return None
     apart, speed, acceleration, torque, angle = (np.concatenate(columns) for columns in zip(*parts, strict=True))
@@ -56,12 +58,17 @@ def error_of_encoder(logs: Sequence[Log], joint: int) -> str | None:
     return f"one of the encoders is off by {1e3 * np.hypot(sine, cosine):.3g} mrad times a sine of the angle, as by a disc off centre"
 
 
+def _width(log: Log) -> int:
+    """Return the length of the moving mean in samples."""
+    return max(round(_SMOOTH_S / log.sample_period), 1)
+
+
 def _signals(log: Log, joint: int) -> tuple[Array, ...]:
     """Return difference of the encoders, speed, acceleration, torque and angle of a joint, smoothed."""
     assert log.q_link is not None
     link = log.q_link[:, joint]
     torque = (log.tau if log.tau_meas is None else log.tau_meas)[:, joint]
-    width = max(round(_SMOOTH_S / log.sample_period), 1)
+    width = _width(log)
     inner = slice(2 * width, -2 * width)
     kernel = np.convolve(np.full(width, 1.0 / width), np.full(width, 1.0 / width))
     apart, angle, torque = (np.convolve(x, kernel, "same") for x in (log.q[:, joint] - link, link, torque))

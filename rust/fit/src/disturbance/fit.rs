@@ -341,30 +341,16 @@ mod tests {
     use armgap_core::arm::Pendulum;
     use armgap_core::effect::find;
 
-    fn push(joint: usize, [impulse, time, duration]: [f64; 3]) -> Disturbance {
-        let law = find::<f64>("external_pulse").expect("known");
-        let push = EffectInstance::new(law, joint, [impulse, time, duration]);
-        Disturbance {
-            holdout: false,
-            track: 0,
-            push,
-            sigma: [0.0; 3],
-            share: 1.0,
-            probability: 1.0,
-            light: false,
-        }
-    }
-
     #[test]
     fn of_two_pushes_on_one_joint_at_one_time_the_lesser_is_part_of_the_other() {
         let open =
             |pushes: &[Disturbance]| -> Vec<_> { pushes.iter().map(|p| (p.clone(), p.clone())).collect() };
-        let large = push(0, [2.0, 3.0, 0.2]);
+        let large = Disturbance::certain(0, [2.0, 3.0, 0.2]);
         for (other, part) in [
-            (push(0, [-0.5, 3.2, 0.1]), Some(1)),
-            (push(0, [-0.5, 3.24, 0.1]), None),
-            (push(1, [-0.5, 3.0, 0.1]), None),
-            (push(0, [5.0, 3.0, 0.1]), Some(0)),
+            (Disturbance::certain(0, [-0.5, 3.2, 0.1]), Some(1)),
+            (Disturbance::certain(0, [-0.5, 3.24, 0.1]), None),
+            (Disturbance::certain(1, [-0.5, 3.0, 0.1]), None),
+            (Disturbance::certain(0, [5.0, 3.0, 0.1]), Some(0)),
         ] {
             assert_eq!(part_of_another(&open(&[large.clone(), other])), part);
         }
@@ -372,9 +358,9 @@ mod tests {
 
     #[test]
     fn pushes_are_near_where_one_acts_in_windows_of_the_other() {
-        let first = push(0, [1.0, 3.0, 0.2]);
+        let first = Disturbance::certain(0, [1.0, 3.0, 0.2]);
         for (time, near) in [(3.3, true), (3.75, true), (3.85, false), (2.0, false)] {
-            assert_eq!(first.is_near(&push(1, [1.0, time, 0.2]), 0.25), near, "{time}");
+            assert_eq!(first.is_near(&Disturbance::certain(1, [1.0, time, 0.2]), 0.25), near, "{time}");
         }
     }
 

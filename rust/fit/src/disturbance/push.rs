@@ -1,7 +1,7 @@
 //! External pushes: torques at one time of one log that are no part of the logged torque, judged within this log.
 //!
 //! `residual` is the residual torque of a log, with possible model errors; `search` finds pulses in it that occur once and do not depend on the
-//! state; `outlying` finds pushes too light for `search`; `fit` sizes a push by output error, where the model is good enough; `law` tells pushes from
+//! state; `outlying` finds pushes too light for `search`; `fit` sizes pushes by output error (`touched`), where the model is good enough; `law` tells pushes from
 //! the action of a torque limit or a stop.
 
 use super::bell::Bell;
@@ -343,6 +343,16 @@ impl Disturbance {
     }
 }
 
+#[cfg(test)]
+impl Disturbance {
+    /// A push of known impulse, time and duration on a joint of the first training log.
+    pub(super) fn certain(joint: usize, p: [f64; 3]) -> Self {
+        let push = EffectInstance::new(find::<f64>("external_pulse").expect("known"), joint, p);
+        let (sigma, share, probability) = ([0.0; 3], 1.0, 1.0);
+        Self { holdout: false, track: 0, push, sigma, share, probability, light: false }
+    }
+}
+
 /// Probability of a push, of the probability `alone` beside the other pulses of its log, where the model leaves a gap unexplained that leaves the belief
 /// `belief` in any push.
 fn beside_remainder(alone: f64, belief: f64) -> f64 {
@@ -381,19 +391,7 @@ mod tests {
 
     #[test]
     fn pushes_that_a_third_links_are_of_one_group() {
-        let law = find::<f64>("external_pulse").expect("known");
-        let at = |time: f64| {
-            let push = EffectInstance::new(law, 0, [1.0, time, 0.1]);
-            Disturbance {
-                holdout: false,
-                track: 0,
-                push,
-                sigma: [0.0; 3],
-                share: 1.0,
-                probability: 1.0,
-                light: false,
-            }
-        };
+        let at = |time: f64| Disturbance::certain(0, [1.0, time, 0.1]);
         let times = |pushes: &[f64]| -> Vec<Vec<f64>> {
             let groups = near_each_other(pushes.iter().map(|t| at(*t)).collect(), 0.25);
             groups.iter().map(|group| group.iter().map(|e| e.push.p[1]).collect()).collect()
